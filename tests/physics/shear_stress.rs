@@ -57,10 +57,7 @@ fn without_forces_time_is_the_integral_of_the_viscosity() {
 
 /// With repulsion the rate is that which makes the stress what it is to be: at this rate viscosity and
 /// velocities are the same.
-fn at_the_rate_that_follows_the_stress_is_that_given<const D: usize>(measured: [f64; 2])
-where
-    gluey_geom::Dim<D>: gluey_geom::Space<D>,
-{
+fn at_the_rate_that_follows_the_stress_is_that_given<const D: usize>(measured: [f64; 2]) {
     let rest = |step: f64| {
         format!("repulsion = {{ force = 5.0, range = 0.2 }}\ntime = {{ step = {step:e}, end = {step:e} }}")
     };

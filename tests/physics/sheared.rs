@@ -77,10 +77,7 @@ fn way_and_viscosity<const D: usize>(case: &Case) -> (Vec<Vector<D>>, Vec<f64>) 
 /// A run past the strain where the tilt wraps round does not know where the seam is: two copies of the cell
 /// side by side go the same way, and so do all particles moved by any vector, up to the error of the mesh.
 /// The cell of the copies is another one from the strain on where only the tilt of the one wraps round.
-fn runs_do_not_know_the_seam<const D: usize>(end: f64, same: f64, [copied, shifted]: [[f64; 2]; 2])
-where
-    gluey_geom::Dim<D>: gluey_geom::Space<D>,
-{
+fn runs_do_not_know_the_seam<const D: usize>(end: f64, same: f64, [copied, shifted]: [[f64; 2]; 2]) {
     let mut case = case(D, &format!("time = {{ step = 0.1, end = {end:?} }}"));
     case.flow.tolerance = 1e-9;
     let (ways, viscosity) = way_and_viscosity::<D>(&case);

@@ -9,7 +9,7 @@ use assert_cmd::Command;
 use flate2::read::ZlibDecoder;
 use gluey::output::vtk::{VtkFrame, VtkWriter};
 use gluey_contact::Domain;
-use gluey_geom::{Dim, Particle, Space, Twist, Vector};
+use gluey_geom::{Particle, Twist, Vector};
 use gluey_motion::Fields;
 use gluey_pictures::{Rgb, color_scale};
 use tempfile::TempDir;
@@ -226,10 +226,7 @@ fn known<const D: usize>(flow: impl Fn(f64) -> (f64, f64)) -> Fields<D> {
 }
 
 /// A folder `out` of a run with one frame of a known flow and a particle in the middle.
-fn run_with_flow<const D: usize>(radius: f64, flow: impl Fn(f64) -> (f64, f64)) -> TempDir
-where
-    Dim<D>: Space<D>,
-{
+fn run_with_flow<const D: usize>(radius: f64, flow: impl Fn(f64) -> (f64, f64)) -> TempDir {
     let folder = TempDir::new().expect("a folder");
     let out = folder.path().join("out");
     let mut writer = VtkWriter::create(&out.join("known-none-vtk"), &[]).expect("a folder");

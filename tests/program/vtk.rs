@@ -8,7 +8,7 @@ use gluey::output::vtk::{
 };
 use gluey::{Case, RunOptions, Silent, VtkOptions, run};
 use gluey_contact::{Contact, Domain, PairKey, Wall};
-use gluey_geom::{Dim, Particle, Space, Twist, Vector};
+use gluey_geom::{Particle, Twist, Vector};
 use gluey_motion::Fields;
 use gluey_suspension::Container;
 use tempfile::TempDir;
@@ -69,10 +69,7 @@ fn one_cell<const D: usize>() -> Fields<D> {
 }
 
 /// A frame of fields without particles.
-fn frame_of<const D: usize>(fields: &Fields<D>) -> VtkFrame<D>
-where
-    Dim<D>: Space<D>,
-{
+fn frame_of<const D: usize>(fields: &Fields<D>) -> VtkFrame<D> {
     VtkFrame {
         step: 40,
         time: 1.0,
@@ -89,9 +86,7 @@ fn cells_have_vtks_order_of_nodes<const D: usize>(
     cell_type: CellType,
     edges: &[[usize; 2]],
     faces: &[[usize; 4]],
-) where
-    Dim<D>: Space<D>,
-{
+) {
     let folder = TempDir::new().expect("a folder");
     let fields = one_cell::<D>();
     let mut writer = VtkWriter::create(folder.path(), &[]).expect("a folder");

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use gluey::output::vtk::{read_fields, read_particles};
 use gluey::{Case, RunError, RunOptions, RunReport, Silent, VtkOptions, run, run_shared};
 use gluey_contact::{ContactModel, PairContact};
-use gluey_geom::{Dim, Space, Vector};
+use gluey_geom::Vector;
 use gluey_motion::Fields;
 use gluey_parallel::{RankFailure, Threads};
 use tempfile::TempDir;
@@ -118,7 +118,6 @@ fn differences<const D: usize>(one: &Fields<D>, other: &Fields<D>) -> [f64; 4] {
 
 fn pieces_hold_what_one_process_writes<const D: usize>(boundary: &str)
 where
-    Dim<D>: Space<D>,
     PairContact<D>: ContactModel<D>,
 {
     let case = case(D, boundary);

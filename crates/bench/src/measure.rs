@@ -8,7 +8,7 @@ use std::io::IsTerminal;
 
 use anyhow::anyhow;
 use gluey_fem::{MeshError, TreeMesh};
-use gluey_geom::{Aabb, Dim, Space, Twist};
+use gluey_geom::{Aabb, Dim, Twist};
 use gluey_levelset::Ball;
 use gluey_linalg::{LinOp, parallel, vector};
 use gluey_stokes::{
@@ -40,20 +40,14 @@ pub fn run(options: &StokesBenchOptions) -> anyhow::Result<Report> {
 }
 
 /// A solve, and what it took.
-struct Solved<const D: usize>
-where
-    Dim<D>: Space<D>,
-{
+struct Solved<const D: usize> {
     report: SolveReport,
     times: SolveTimes,
     residual_rel: f64,
     twists: Vec<Twist<D>>,
 }
 
-fn measure<const D: usize>(options: &StokesBenchOptions) -> anyhow::Result<Report>
-where
-    Dim<D>: Space<D>,
-{
+fn measure<const D: usize>(options: &StokesBenchOptions) -> anyhow::Result<Report> {
     progress(options, "mesh, operator and levels");
     let (problem, mut solver, setup) = prepare::<D>(options)?;
     progress(options, "solve");
@@ -96,10 +90,7 @@ where
 /// Everything up to the first iteration, but for the right-hand side.
 fn prepare<const D: usize>(
     options: &StokesBenchOptions,
-) -> anyhow::Result<(Problem<D>, MultigridSolver<D>, SolveTimes)>
-where
-    Dim<D>: Space<D>,
-{
+) -> anyhow::Result<(Problem<D>, MultigridSolver<D>, SolveTimes)> {
     let formulation = options.formulation();
     let stopwatch = Stopwatch::start();
     let mesh = mesh(options, &options.case.balls_of_the_mesh())?;
@@ -123,10 +114,7 @@ fn solve<const D: usize>(
     options: &StokesBenchOptions,
     problem: &Problem<D>,
     solver: &mut MultigridSolver<D>,
-) -> anyhow::Result<Solved<D>>
-where
-    Dim<D>: Space<D>,
-{
+) -> anyhow::Result<Solved<D>> {
     let lift = problem.lift(&cases::couette);
     let b = problem.right_hand_side(&lift, options.case.force());
     let mut x = parallel::filled(0.0, problem.system.dim());
@@ -138,10 +126,7 @@ where
 }
 
 /// `|b - A x| / |b|`, computed anew.
-fn residual_rel<const D: usize>(system: &StokesSystem<D>, b: &[f64], x: &[f64]) -> f64
-where
-    Dim<D>: Space<D>,
-{
+fn residual_rel<const D: usize>(system: &StokesSystem<D>, b: &[f64], x: &[f64]) -> f64 {
     let mut r = vec![0.0; b.len()];
     SystemOperator::new(system).apply(x, &mut r);
     vector::residual_from_product(b, &mut r);
@@ -149,10 +134,7 @@ where
 }
 
 /// CPU seconds of one application of the Stokes operator in `f64`.
-fn operator_cpu_s<const D: usize>(system: &StokesSystem<D>) -> Option<f64>
-where
-    Dim<D>: Space<D>,
-{
+fn operator_cpu_s<const D: usize>(system: &StokesSystem<D>) -> Option<f64> {
     let mut operator = SystemOperator::new(system);
     let (mut x, mut y) = (vec![0.0; system.dim()], vec![0.0; system.dim()]);
     vector::fill_pseudo_random(1, &mut x);

@@ -8,7 +8,7 @@ use std::time::Instant;
 use gluey_contact::{
     ContactError, ContactParams, ContactReport, GammaUpdate, PairContact, SolverKind, StepGeometry,
 };
-use gluey_geom::{Dim, Space, Twist, Vector};
+use gluey_geom::{Twist, Vector};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
@@ -62,10 +62,7 @@ fn solve<const D: usize>(
     kind: &str,
     solver: SolverKind,
     iteration_limit: usize,
-) -> (f64, Result<ContactReport, ContactError>)
-where
-    Dim<D>: Space<D>,
-{
+) -> (f64, Result<ContactReport, ContactError>) {
     let centre = positions.iter().sum::<Vector<D>>() / positions.len() as f64;
     let mut random = ChaCha8Rng::seed_from_u64(3);
     let mut twists: Vec<Twist<D>> = positions
@@ -87,10 +84,7 @@ where
     (start.elapsed().as_secs_f64(), outcome)
 }
 
-fn table<const D: usize>(iteration_limit: usize)
-where
-    Dim<D>: Space<D>,
-{
+fn table<const D: usize>(iteration_limit: usize) {
     for shape in ["chain", "square", "dense", "random"] {
         for kind in ["squeeze", "shear", "random"] {
             for count in COUNTS {

@@ -1,6 +1,6 @@
 //! The interface of contact models: the step they correct, and the report on it.
 
-use gluey_geom::{Dim, Pose, Space, Twist, Vector};
+use gluey_geom::{Pose, Twist, Vector};
 #[cfg(feature = "serde")]
 use serde::{Deserialize, Serialize};
 
@@ -25,10 +25,7 @@ pub struct StepGeometry<'a, const D: usize> {
 /// The step `x^{n+1} = x^n + c u^n + drift` of bodies that also turn, by the vector `c w^n + drift`. One
 /// entry per body.
 #[derive(Clone, Copy, Debug)]
-pub struct BodyStep<'a, const D: usize>
-where
-    Dim<D>: Space<D>,
-{
+pub struct BodyStep<'a, const D: usize> {
     /// Centres and orientations at the beginning of the step.
     pub poses: &'a [Pose<D>],
     /// Radii of round bodies; not used by models that know the bodies' shapes.
@@ -41,10 +38,7 @@ where
     pub dt: f64,
 }
 
-impl<const D: usize> BodyStep<'_, D>
-where
-    Dim<D>: Space<D>,
-{
+impl<const D: usize> BodyStep<'_, D> {
     /// Displacements of the centres with these velocities.
     pub(crate) fn moves(&self, twists: &[Twist<D>]) -> Vec<Vector<D>> {
         let moves = twists.iter().zip(self.drift);
@@ -53,10 +47,7 @@ where
 }
 
 /// Corrects predicted velocities so that bodies do not overlap.
-pub trait ContactModel<const D: usize>
-where
-    Dim<D>: Space<D>,
-{
+pub trait ContactModel<const D: usize> {
     /// Corrects `twists`; on an error they and the memory are as before.
     fn correct_bodies(
         &mut self,
@@ -165,10 +156,7 @@ pub(crate) fn validate<const D: usize>(
     step: &StepGeometry<'_, D>,
     twists: &[Twist<D>],
     domain: &Domain<D>,
-) -> Result<(), ContactError>
-where
-    Dim<D>: Space<D>,
-{
+) -> Result<(), ContactError> {
     let count = step.positions.len();
     validate_sizes([count, step.radii.len(), step.drift.len(), twists.len()], step.velocity_weight, step.dt)?;
     for particle in 0..count {

@@ -17,7 +17,7 @@ use clap::Parser;
 use common::{Spread, TrafficRecord, fail, hash, on_ranks};
 use gluey_distributed::{BoxFlow, LevelSizes, LocalFlow, SurfaceBodies, equal_cuts};
 use gluey_fem::ImplicitTree;
-use gluey_geom::{Aabb, Dim, Space, Vector, Wrench};
+use gluey_geom::{Aabb, Dim, Vector, Wrench};
 use gluey_levelset::{Ball, BallTree};
 use gluey_parallel::{Communicator, Ranks};
 use gluey_stokes::{Conditions, Lubrication, Refinement};
@@ -64,10 +64,7 @@ fn run(options: &Options, ranks: &Ranks) -> String {
     }
 }
 
-fn solve<const D: usize>(options: &Options, ranks: &Ranks) -> String
-where
-    Dim<D>: Space<D>,
-{
+fn solve<const D: usize>(options: &Options, ranks: &Ranks) -> String {
     let balls = match options {
         Options { pair: true, .. } => pair::<D>(),
         Options { bodies: true, .. } => bodies::<D>(),
@@ -134,10 +131,7 @@ fn bodies<const D: usize>() -> Vec<Ball<D>> {
 }
 
 /// A force on each body, and a torque on it.
-fn wrenches<const D: usize>(count: usize) -> Vec<Wrench<D>>
-where
-    Dim<D>: Space<D>,
-{
+fn wrenches<const D: usize>(count: usize) -> Vec<Wrench<D>> {
     let wrench = |k: usize| {
         let mut wrench = Wrench::default();
         (wrench.force[k % D], wrench.torque[0]) = (0.3, 0.01 * (k + 1) as f64);
@@ -177,10 +171,7 @@ struct Record {
 }
 
 impl Record {
-    fn new<const D: usize>(options: &Options, ranks: &Ranks, mine: &LocalFlow<D>) -> Self
-    where
-        Dim<D>: Space<D>,
-    {
+    fn new<const D: usize>(options: &Options, ranks: &Ranks, mine: &LocalFlow<D>) -> Self {
         let motions = mine
             .flow
             .twists

@@ -22,7 +22,7 @@ use gluey_contact::{
     StepGeometry, WithFixed,
 };
 use gluey_distributed::{ContactLoad, SharedContact};
-use gluey_geom::{Dim, Space, Twist, Vector};
+use gluey_geom::{Twist, Vector};
 use gluey_parallel::{Communicator, Ranks, Traffic};
 use gluey_testkit::packing::Packing;
 use serde::Serialize;
@@ -75,10 +75,7 @@ fn run(options: &Options, ranks: &Ranks) -> String {
     }
 }
 
-fn steps<const D: usize>(options: &Options, ranks: &Ranks) -> String
-where
-    Dim<D>: Space<D>,
-{
+fn steps<const D: usize>(options: &Options, ranks: &Ranks) -> String {
     let (mut shear, is_first) = (Shear::<D>::new(options, ranks), ranks.rank() == 0);
     let (mut report, mut traffic, mut worked) = (ContactReport::default(), Traffic::default(), 0);
     for step in 0..options.steps {
@@ -102,10 +99,7 @@ where
 }
 
 /// Particles on their way.
-struct Shear<'a, const D: usize>
-where
-    Dim<D>: Space<D>,
-{
+struct Shear<'a, const D: usize> {
     positions: Vec<Vector<D>>,
     radii: Vec<f64>,
     drift: Vec<Vector<D>>,
@@ -113,10 +107,7 @@ where
     contact: SharedContact<'a, D>,
 }
 
-impl<'a, const D: usize> Shear<'a, D>
-where
-    Dim<D>: Space<D>,
-{
+impl<'a, const D: usize> Shear<'a, D> {
     fn new(options: &Options, ranks: &'a Ranks) -> Self {
         let Packing { positions, side } = Packing::<D>::fluid(options.count, options.fraction, 1);
         let farthest = f64::max(0.5, options.dt * side);
@@ -182,10 +173,7 @@ impl Record {
         ranks: usize,
         report: &ContactReport,
         (shear, traffic): (&Shear<'_, D>, TrafficRecord),
-    ) -> Self
-    where
-        Dim<D>: Space<D>,
-    {
+    ) -> Self {
         let contacts = shear.contact.contacts();
         let of_contacts = contacts.iter().flat_map(|contact| [contact.lambda, contact.gamma]);
         let numbers = shear.positions.iter().flat_map(|x| x.iter().copied()).chain(of_contacts);

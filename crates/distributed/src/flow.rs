@@ -1,6 +1,6 @@
 //! A flow in a box that ranks share.
 
-use gluey_geom::{Dim, Space, Vector};
+use gluey_geom::Vector;
 use gluey_parallel::Traffic;
 use gluey_stokes::part::LevelSizes;
 use gluey_stokes::{Flow, FlowParams, Formulation, Lubrication, RaisedPenalties, SolverKind};
@@ -32,10 +32,7 @@ impl BoxFlow {
 /// are the same on all ranks. Velocities and pressures at the nodes that ranks own, in the order of the
 /// ranks, are those at all nodes in the order of one process.
 #[derive(Clone, Debug)]
-pub struct LocalFlow<const D: usize>
-where
-    Dim<D>: Space<D>,
-{
+pub struct LocalFlow<const D: usize> {
     /// The flow.
     pub flow: Flow<D>,
     /// How penalties were changed for it.
@@ -46,10 +43,7 @@ where
     pub setup_traffic: Traffic,
 }
 
-impl<const D: usize> LocalFlow<D>
-where
-    Dim<D>: Space<D>,
-{
+impl<const D: usize> LocalFlow<D> {
     /// Places of the velocity nodes that the rank owns.
     pub fn points(&self) -> Vec<Vector<D>> {
         let mesh = &self.flow.discretisation;

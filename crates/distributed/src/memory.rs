@@ -3,7 +3,6 @@
 use std::cell::RefCell;
 use std::sync::Arc;
 
-use gluey_geom::{Dim, Space};
 use gluey_parallel::Ranks;
 use gluey_stokes::Suspension;
 
@@ -22,10 +21,7 @@ impl<const D: usize> Default for FlowMemory<D> {
     }
 }
 
-impl<const D: usize> FlowMemory<D>
-where
-    Dim<D>: Space<D>,
-{
+impl<const D: usize> FlowMemory<D> {
     /// Keeps what the next flow starts from for a checkpoint.
     pub(crate) fn remember(&self) {
         self.remembered.replace(self.last.borrow().clone());

@@ -9,7 +9,7 @@
 use std::sync::Arc;
 
 use gluey_fem::{Cell, Cuts, ImplicitTree, TreeMesh};
-use gluey_geom::{Dim, Space, Vector};
+use gluey_geom::Vector;
 use gluey_levelset::{Ball, BallTree, Body};
 use gluey_parallel::{Communicator, Ranks};
 use gluey_stokes::part::{GhostLayer, levels, owner_of_point, rings_around_surfaces, sizes};
@@ -49,10 +49,7 @@ impl BoxFlow {
         cuts: &Cuts,
         ranks: &Ranks,
         walls: &dyn Fn(&Vector<D>) -> Vector<D>,
-    ) -> Result<LocalFlow<D>, StokesError>
-    where
-        Dim<D>: Space<D>,
-    {
+    ) -> Result<LocalFlow<D>, StokesError> {
         if tree.frame().periodic().into_iter().all(|is_periodic| is_periodic) {
             return Err(StokesError::NoWall);
         }
@@ -73,10 +70,7 @@ impl BoxFlow {
         cuts: &Cuts,
         ranks: &Ranks,
         conditions: &Conditions<'_, D>,
-    ) -> Result<LocalFlow<D>, StokesError>
-    where
-        Dim<D>: Space<D>,
-    {
+    ) -> Result<LocalFlow<D>, StokesError> {
         conditions.check_count(around.balls.len())?;
         let leaves = &mut SharedTree { tree, cuts, ranks };
         let solve = |solver: &mut FlowSolver<D>, mesh: &Discretisation<D>| {
@@ -96,10 +90,7 @@ impl BoxFlow {
         leaves: &mut SharedTree<'_, '_, D>,
         kept: &mut Option<Arc<KeptFlows<D>>>,
         solve: impl FnOnce(&mut FlowSolver<D>, &Discretisation<D>) -> Result<(Flow<D>, T), E>,
-    ) -> Result<(LocalFlow<D>, T), E>
-    where
-        Dim<D>: Space<D>,
-    {
+    ) -> Result<(LocalFlow<D>, T), E> {
         let (last, start) = (kept.take(), leaves.ranks.traffic());
         let meshes = levels_around(around, leaves)?;
         let (finest, coarser) = meshes.split_last().expect("a tree has a finest level");
@@ -130,10 +121,7 @@ impl BoxFlow {
 fn levels_around<const D: usize>(
     around: &SurfaceBodies<'_, D>,
     leaves: &mut SharedTree<'_, '_, D>,
-) -> Result<Vec<Discretisation<D>>, StokesError>
-where
-    Dim<D>: Space<D>,
-{
+) -> Result<Vec<Discretisation<D>>, StokesError> {
     let SharedTree { tree, cuts, ranks } = leaves;
     let frame = tree.frame().clone();
     let cell_size = frame.size(frame.max_level());

@@ -3,7 +3,7 @@
 #![allow(clippy::unwrap_used, reason = "a failure here is a failing test")]
 
 use gluey_distributed::{BoxFlow, SharedSuspension};
-use gluey_geom::{Aabb, Dim, Space, Vector};
+use gluey_geom::{Aabb, Vector};
 use gluey_motion::Configuration;
 use gluey_parallel::{Ranks, Threads};
 use gluey_stokes::{Lubrication, Refinement, Suspension};
@@ -15,10 +15,7 @@ static ALLOCATOR: CountingAllocator = CountingAllocator;
 const RANKS: usize = 16;
 
 /// The most bytes of one allocation of a rank, among all.
-fn largest<const D: usize>(lubrication: Lubrication, level: u8, ranks: usize) -> usize
-where
-    Dim<D>: Space<D>,
-{
+fn largest<const D: usize>(lubrication: Lubrication, level: u8, ranks: usize) -> usize {
     // Libraries take what they need once in each thread, whatever the mesh.
     let [small, whole] = [4, level].map(|level| suspension::<D>(lubrication, level));
     // They nearly touch, so that there is a gap.
@@ -35,10 +32,7 @@ where
 }
 
 /// Two bodies among cells of one level.
-fn suspension<const D: usize>(lubrication: Lubrication, level: u8) -> SharedSuspension<D>
-where
-    Dim<D>: Space<D>,
-{
+fn suspension<const D: usize>(lubrication: Lubrication, level: u8) -> SharedSuspension<D> {
     let flow = BoxFlow { viscosity: 1.0, tolerance: 1e-3, max_iterations: 50 };
     let suspension = Suspension {
         domain: Aabb::unit(),
@@ -57,10 +51,7 @@ where
 }
 
 /// A rank holds its part of the whole and what is around it.
-fn allocations_shrink<const D: usize>(lubrication: Lubrication, level: u8, share: f64)
-where
-    Dim<D>: Space<D>,
-{
+fn allocations_shrink<const D: usize>(lubrication: Lubrication, level: u8, share: f64) {
     let (alone, shared) = (largest::<D>(lubrication, level, 1), largest::<D>(lubrication, level, RANKS));
     let nodes = ((1usize << (level + 1)) + 1).pow(D as u32);
     assert!(alone >= nodes * D * size_of::<f32>(), "one rank has vectors of all velocities: {alone}");

@@ -1,8 +1,8 @@
 //! Vectors, rotations, poses, twists and wrenches in `D` = 2 and 3 dimensions.
 //!
 //! Code that is the same in every dimension is written once for `D`; what is not (the number of rotations,
-//! the cross product, quaternions) stands in the sealed trait [`Space`], implemented for `Dim<2>` and
-//! `Dim<3>` only.
+//! the cross product, quaternions) stands behind [`Spin`], [`Rotation`] and the functions of [`Dim`]. For
+//! another dimension the number of rotations, [`Dim::ROT`], does not compile.
 //!
 //! ```
 //! use gluey_geom::{Twist, Vector, Spin};
@@ -21,7 +21,7 @@ pub use aabb::Aabb;
 pub use algebra::{Matrix, Vector};
 pub use lattice::Lattice;
 pub use motion::{Particle, Pose, Twist, Wrench};
-pub use space::{Dim, Rotation, Space, Spin, Stored};
+pub use space::{Dim, Rotation, Spin};
 
 /// The examples of the README.
 #[cfg(doctest)]

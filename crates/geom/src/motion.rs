@@ -5,26 +5,20 @@ use std::ops::{Add, Mul, Neg, Sub};
 #[cfg(feature = "serde")]
 use serde::{Deserialize, Serialize};
 
-use crate::{Dim, Rotation, Space, Spin, Vector};
+use crate::{Dim, Rotation, Spin, Vector};
 
 /// Position of the centre and orientation of a body.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(Serialize, Deserialize))]
 #[cfg_attr(feature = "serde", serde(bound = ""))]
-pub struct Pose<const D: usize>
-where
-    Dim<D>: Space<D>,
-{
+pub struct Pose<const D: usize> {
     /// Centre.
     pub position: Vector<D>,
     /// Orientation relative to the body's own frame.
     pub orientation: Rotation<D>,
 }
 
-impl<const D: usize> Pose<D>
-where
-    Dim<D>: Space<D>,
-{
+impl<const D: usize> Pose<D> {
     /// A body at `position` in its reference orientation.
     pub fn at(position: Vector<D>) -> Self {
         Self { position, orientation: Dim::<D>::identity() }
@@ -35,29 +29,20 @@ where
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(Serialize, Deserialize))]
 #[cfg_attr(feature = "serde", serde(bound = ""))]
-pub struct Twist<const D: usize>
-where
-    Dim<D>: Space<D>,
-{
+pub struct Twist<const D: usize> {
     /// Velocity of the centre.
     pub velocity: Vector<D>,
     /// Angular velocity.
     pub spin: Spin<D>,
 }
 
-impl<const D: usize> Default for Twist<D>
-where
-    Dim<D>: Space<D>,
-{
+impl<const D: usize> Default for Twist<D> {
     fn default() -> Self {
         Self { velocity: Vector::zeros(), spin: Dim::<D>::zero_spin() }
     }
 }
 
-impl<const D: usize> Twist<D>
-where
-    Dim<D>: Space<D>,
-{
+impl<const D: usize> Twist<D> {
     /// Velocity `U + w x r` of the material point at `r` from the centre.
     pub fn velocity_at(&self, r: &Vector<D>) -> Vector<D> {
         self.velocity + Dim::<D>::cross_spin(&self.spin, r)
@@ -68,29 +53,20 @@ where
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(Serialize, Deserialize))]
 #[cfg_attr(feature = "serde", serde(bound = ""))]
-pub struct Wrench<const D: usize>
-where
-    Dim<D>: Space<D>,
-{
+pub struct Wrench<const D: usize> {
     /// Force.
     pub force: Vector<D>,
     /// Torque about the centre; counter-clockwise in 2D.
     pub torque: Spin<D>,
 }
 
-impl<const D: usize> Default for Wrench<D>
-where
-    Dim<D>: Space<D>,
-{
+impl<const D: usize> Default for Wrench<D> {
     fn default() -> Self {
         Self { force: Vector::zeros(), torque: Dim::<D>::zero_spin() }
     }
 }
 
-impl<const D: usize> Wrench<D>
-where
-    Dim<D>: Space<D>,
-{
+impl<const D: usize> Wrench<D> {
     /// Power `F.U + T.w` on a body that moves with `twist`.
     pub fn power(&self, twist: &Twist<D>) -> f64 {
         let [torque, spin] = [&self.torque, &twist.spin].map(Dim::<D>::spin_slice);
@@ -101,10 +77,7 @@ where
 /// Sums, differences and multiples of a pair of a vector and a spin.
 macro_rules! linear {
     ($type:ident { $vector:ident, $spin:ident }) => {
-        impl<const D: usize> Neg for $type<D>
-        where
-            Dim<D>: Space<D>,
-        {
+        impl<const D: usize> Neg for $type<D> {
             type Output = Self;
 
             fn neg(self) -> Self {
@@ -112,10 +85,7 @@ macro_rules! linear {
             }
         }
 
-        impl<const D: usize> Add for $type<D>
-        where
-            Dim<D>: Space<D>,
-        {
+        impl<const D: usize> Add for $type<D> {
             type Output = Self;
 
             fn add(self, other: Self) -> Self {
@@ -123,10 +93,7 @@ macro_rules! linear {
             }
         }
 
-        impl<const D: usize> Sub for $type<D>
-        where
-            Dim<D>: Space<D>,
-        {
+        impl<const D: usize> Sub for $type<D> {
             type Output = Self;
 
             fn sub(self, other: Self) -> Self {
@@ -134,10 +101,7 @@ macro_rules! linear {
             }
         }
 
-        impl<const D: usize> Mul<f64> for $type<D>
-        where
-            Dim<D>: Space<D>,
-        {
+        impl<const D: usize> Mul<f64> for $type<D> {
             type Output = Self;
 
             fn mul(self, factor: f64) -> Self {
@@ -154,20 +118,14 @@ linear!(Wrench { force, torque });
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(Serialize, Deserialize))]
 #[cfg_attr(feature = "serde", serde(bound = ""))]
-pub struct Particle<const D: usize>
-where
-    Dim<D>: Space<D>,
-{
+pub struct Particle<const D: usize> {
     /// Centre and orientation.
     pub pose: Pose<D>,
     /// Radius `a > 0`.
     pub radius: f64,
 }
 
-impl<const D: usize> Particle<D>
-where
-    Dim<D>: Space<D>,
-{
+impl<const D: usize> Particle<D> {
     /// A particle of the given radius at `position`.
     pub fn new(position: Vector<D>, radius: f64) -> Self {
         Self { pose: Pose::at(position), radius }

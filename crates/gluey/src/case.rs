@@ -68,7 +68,7 @@ pub use repulsion::RepulsionSpec;
 pub use suspension::{RadiiSpec, SuspensionSpec};
 
 use gluey_contact::{Domain, Wall};
-use gluey_geom::{Dim, Lattice, Particle, Space, Vector};
+use gluey_geom::{Lattice, Particle, Vector};
 use schemars::{JsonSchema, Schema, SchemaGenerator};
 use serde::{Deserialize, Serialize};
 
@@ -256,10 +256,7 @@ impl Case {
     }
 
     /// The particles of a checked case at time 0.
-    pub(crate) fn start<const D: usize>(&self) -> Vec<Particle<D>>
-    where
-        Dim<D>: Space<D>,
-    {
+    pub(crate) fn start<const D: usize>(&self) -> Vec<Particle<D>> {
         let position = |coordinates: &[f64]| Vector::<D>::from_fn(|axis, _| coordinates[axis]);
         self.particles.iter().map(|spec| Particle::new(position(&spec.position), spec.radius)).collect()
     }

@@ -10,7 +10,6 @@ use std::fs;
 use std::io::{self, Read};
 use std::path::{Path, PathBuf};
 
-use gluey_geom::{Dim, Space};
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
@@ -29,10 +28,7 @@ const KIND: FileKind = FileKind { magic: b"gluey-ck", layout: VERSION };
 /// A run between two steps.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(bound = "")]
-pub struct Checkpoint<const D: usize>
-where
-    Dim<D>: Space<D>,
-{
+pub struct Checkpoint<const D: usize> {
     /// Particles, history, contact memory, warm start of the flow.
     pub state: SimulationState<D>,
     /// How far the files of rows had come.
@@ -175,10 +171,7 @@ struct Payload {
     run: Vec<u8>,
 }
 
-impl<const D: usize> Checkpoint<D>
-where
-    Dim<D>: Space<D>,
-{
+impl<const D: usize> Checkpoint<D> {
     /// Writes the checkpoint of a run of `case`, all or nothing.
     pub fn write(&self, case: &Case, path: &Path) -> Result<(), FileError> {
         let encode = || -> io::Result<Vec<u8>> {
@@ -270,10 +263,7 @@ impl CheckpointSummary {
 }
 
 /// Steps done, seconds spent, and pieces of the flow.
-fn progress<const D: usize>(run: &[u8]) -> Option<(usize, f64, Option<FlowPieces>)>
-where
-    Dim<D>: Space<D>,
-{
+fn progress<const D: usize>(run: &[u8]) -> Option<(usize, f64, Option<FlowPieces>)> {
     let checkpoint: Checkpoint<D> = postcard::from_bytes(run).ok()?;
     Some((checkpoint.state.step, checkpoint.wall_s, checkpoint.pieces))
 }

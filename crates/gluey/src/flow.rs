@@ -10,7 +10,7 @@ mod prepared;
 
 use std::time::Instant;
 
-use gluey_geom::{Dim, Space, Vector};
+use gluey_geom::Vector;
 use gluey_levelset::Ball;
 use gluey_motion::{Configuration, Fields, Film, Hydrodynamics, Prediction, ResumeError};
 use gluey_stokes::{Drive, Flow, FlowParams, FlowSolver, NodalFields, Suspension};
@@ -55,10 +55,7 @@ impl From<SavedFields> for NodalFields {
 }
 
 /// Finite-element flow around the particles of a case.
-pub struct StokesFlow<const D: usize>
-where
-    Dim<D>: Space<D>,
-{
+pub struct StokesFlow<const D: usize> {
     suspension: Suspension<D>,
     params: FlowParams,
     solver: FlowSolver<D>,
@@ -69,10 +66,7 @@ where
 }
 
 /// The last flow, in the box.
-struct Last<const D: usize>
-where
-    Dim<D>: Space<D>,
-{
+struct Last<const D: usize> {
     flow: Flow<D>,
     balls: Vec<Ball<D>>,
     shear_factor: f64,
@@ -82,19 +76,13 @@ where
 ///
 /// # Errors
 /// [`FlowError`] if the box cannot be meshed or a parameter is out of range.
-pub fn stokes_flow<const D: usize>(case: &Case) -> Result<StokesFlow<D>, FlowError>
-where
-    Dim<D>: Space<D>,
-{
+pub fn stokes_flow<const D: usize>(case: &Case) -> Result<StokesFlow<D>, FlowError> {
     let (suspension, params) = (suspension(case)?, flow_params::<D>(case));
     let solver = FlowSolver::new(params)?;
     Ok(StokesFlow { suspension, params, solver, last: None, places: Vec::new(), strain: 0.0 })
 }
 
-impl<const D: usize> Hydrodynamics<D> for StokesFlow<D>
-where
-    Dim<D>: Space<D>,
-{
+impl<const D: usize> Hydrodynamics<D> for StokesFlow<D> {
     type Error = FlowError;
 
     fn predict(&mut self, configuration: &Configuration<'_, D>) -> Result<Prediction<D>, FlowError> {

@@ -1,6 +1,5 @@
 //! The models that predict velocities for a case, and why they fail.
 
-use gluey_geom::{Dim, Space};
 use gluey_motion::{LinearFlow, PairMobility, PairMobilityError};
 use thiserror::Error;
 
@@ -38,10 +37,7 @@ impl HydrodynamicsError {
 }
 
 /// The finite-element flow of `case`.
-pub(crate) fn stokes<const D: usize>(case: &Case) -> Result<StokesFlow<D>, HydrodynamicsError>
-where
-    Dim<D>: Space<D>,
-{
+pub(crate) fn stokes<const D: usize>(case: &Case) -> Result<StokesFlow<D>, HydrodynamicsError> {
     Ok(stokes_flow(case)?)
 }
 

@@ -1,6 +1,6 @@
 //! Near pairs, and the smallest gap, at a cost proportional to the number of particles.
 
-use gluey_geom::{Dim, Space, Vector};
+use gluey_geom::Vector;
 use gluey_suspension::{Container, for_each_pair};
 
 use crate::trajectory::TrajectoryRow;
@@ -20,10 +20,7 @@ pub(crate) struct PairGap {
 }
 
 /// All pairs with a gap of at most `reach >= 0`, sorted by particles.
-pub(crate) fn within<const D: usize>(row: &TrajectoryRow<'_, D>, reach: f64) -> Vec<PairGap>
-where
-    Dim<D>: Space<D>,
-{
+pub(crate) fn within<const D: usize>(row: &TrajectoryRow<'_, D>, reach: f64) -> Vec<PairGap> {
     let lattice = row.domain.lattice.reduced();
     let centers: Vec<Vector<D>> = row.particles.iter().map(|particle| particle.pose.position).collect();
     let largest = row.particles.iter().map(|particle| particle.radius).fold(0.0, f64::max);
@@ -50,10 +47,7 @@ pub(crate) fn smallest<const D: usize>(
     row: &TrajectoryRow<'_, D>,
     near: &[PairGap],
     mut reach: f64,
-) -> Option<f64>
-where
-    Dim<D>: Space<D>,
-{
+) -> Option<f64> {
     let smallest = |pairs: &[PairGap]| pairs.iter().map(|pair| pair.gap).reduce(f64::min);
     let mut found = smallest(near);
     // No pair is nearer than `reach`, so within twice that a particle has few neighbours, however many there
@@ -82,10 +76,7 @@ mod tests {
     }
 
     /// All pairs, and the smallest gap, are those of a look at every pair.
-    fn agrees<const D: usize>(domain: &Domain<D>, count: usize, radius: f64, spread: f64)
-    where
-        Dim<D>: Space<D>,
-    {
+    fn agrees<const D: usize>(domain: &Domain<D>, count: usize, radius: f64, spread: f64) {
         let mut next = numbers();
         for _ in 0..20 {
             let particles: Vec<Particle<D>> = (0..count)
@@ -109,10 +100,7 @@ mod tests {
         }
     }
 
-    fn agrees_everywhere<const D: usize>()
-    where
-        Dim<D>: Space<D>,
-    {
+    fn agrees_everywhere<const D: usize>() {
         let open = Domain::default();
         let channel = Domain::default().with_period(0, 1.0);
         let periodic = Domain::periodic(&Vector::<D>::repeat(1.0));

@@ -33,7 +33,6 @@ use std::sync::atomic::Ordering;
 use std::sync::{Arc, Mutex, MutexGuard};
 use std::time::Instant;
 
-use gluey_geom::{Dim, Space};
 use gluey_parallel::Communicator;
 
 pub use error::RunError;
@@ -120,7 +119,6 @@ fn run_alone<const D: usize, H>(
     hydrodynamics: H,
 ) -> Result<Option<RunReport>, RunError>
 where
-    Dim<D>: Space<D>,
     H: gluey_motion::Hydrodynamics<D>,
     HydrodynamicsError: From<H::Error>,
 {
@@ -145,10 +143,7 @@ fn claim_outputs(
 }
 
 /// A run in progress, on each of the ranks that share it.
-struct RunInProgress<'a, const D: usize, H, C>
-where
-    Dim<D>: Space<D>,
-{
+struct RunInProgress<'a, const D: usize, H, C> {
     case: &'a Case,
     options: &'a RunOptions,
     progress: &'a dyn Progress,
@@ -167,7 +162,6 @@ where
 
 impl<'a, const D: usize, H, C> RunInProgress<'a, D, H, C>
 where
-    Dim<D>: Space<D>,
     H: gluey_motion::Hydrodynamics<D>,
     C: Surrounded<D>,
     HydrodynamicsError: From<H::Error>,

@@ -8,7 +8,7 @@ mod strain_clock;
 use gluey_contact::{
     Contact, ContactModel, ContactState, Domain, FilmError, FilmMemory, FilmReport, GapReport, film_reach,
 };
-use gluey_geom::{Dim, Matrix, Particle, Space, Twist};
+use gluey_geom::{Dim, Matrix, Particle, Twist};
 use gluey_motion::{
     Configuration, Fields, FlowStatistics, Holding, Hydrodynamics, Integrator, MeanStress, NoForces,
     Prediction, Scheme,
@@ -45,10 +45,7 @@ pub use strain_clock::StrainClock;
 /// # Ok::<(), gluey::StepError<gluey_motion::PairMobilityError>>(())
 /// ```
 #[derive(Debug)]
-pub struct Simulation<const D: usize, H, C>
-where
-    Dim<D>: Space<D>,
-{
+pub struct Simulation<const D: usize, H, C> {
     dt: f64,
     step: usize,
     /// The part of the step that is being done.
@@ -89,10 +86,7 @@ pub struct Sliding {
 /// Everything a simulation needs to go on as if it had never stopped.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(bound = "")]
-pub struct SimulationState<const D: usize>
-where
-    Dim<D>: Space<D>,
-{
+pub struct SimulationState<const D: usize> {
     /// Steps done.
     pub step: usize,
     /// Whether the shear is reversed.
@@ -115,7 +109,6 @@ where
 
 impl<const D: usize, H, C> Simulation<D, H, C>
 where
-    Dim<D>: Space<D>,
     H: Hydrodynamics<D>,
     C: ContactModel<D>,
 {
@@ -468,10 +461,7 @@ where
     }
 }
 
-fn is_finite<const D: usize>(twist: &Twist<D>) -> bool
-where
-    Dim<D>: Space<D>,
-{
+fn is_finite<const D: usize>(twist: &Twist<D>) -> bool {
     let numbers = twist.velocity.iter().chain(Dim::<D>::spin_slice(&twist.spin));
     numbers.into_iter().all(|number| number.is_finite())
 }

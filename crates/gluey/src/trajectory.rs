@@ -1,16 +1,13 @@
 //! One instant of a run, and what of all instants the report needs.
 
 use gluey_contact::Domain;
-use gluey_geom::{Dim, Lattice, Particle, Space, Twist, Vector};
+use gluey_geom::{Lattice, Particle, Twist, Vector};
 
 use crate::interpolate::cubic;
 
 /// Particles at an instant, and how they move.
 #[derive(Clone, Copy, Debug)]
-pub struct TrajectoryRow<'a, const D: usize>
-where
-    Dim<D>: Space<D>,
-{
+pub struct TrajectoryRow<'a, const D: usize> {
     /// Time.
     pub time: f64,
     /// Particles; their centres are not brought back into the period.
@@ -21,10 +18,7 @@ where
     pub domain: &'a Domain<D>,
 }
 
-impl<const D: usize> TrajectoryRow<'_, D>
-where
-    Dim<D>: Space<D>,
-{
+impl<const D: usize> TrajectoryRow<'_, D> {
     /// Mean radius of the particles.
     pub fn mean_radius(&self) -> f64 {
         self.particles.iter().map(|particle| particle.radius).sum::<f64>() / self.particles.len() as f64

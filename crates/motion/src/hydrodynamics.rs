@@ -1,6 +1,6 @@
 //! The trait that stands between the flow and the particles.
 
-use gluey_geom::{Dim, Matrix, Particle, Space, Twist, Vector, Wrench};
+use gluey_geom::{Matrix, Particle, Twist, Vector, Wrench};
 
 use gluey_contact::Film;
 
@@ -17,10 +17,7 @@ use gluey_contact::Film;
 /// # Ok::<(), gluey_motion::NoForces>(())
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Configuration<'a, const D: usize>
-where
-    Dim<D>: Space<D>,
-{
+pub struct Configuration<'a, const D: usize> {
     /// The time.
     pub time: f64,
     /// Where the particles are.
@@ -39,10 +36,7 @@ where
     pub pair_stress: Matrix<D>,
 }
 
-impl<'a, const D: usize> Configuration<'a, D>
-where
-    Dim<D>: Space<D>,
-{
+impl<'a, const D: usize> Configuration<'a, D> {
     /// Particles without forces at a time, in a shear as configured and images above each other.
     pub fn at(time: f64, particles: &'a [Particle<D>]) -> Self {
         Self {
@@ -59,10 +53,7 @@ where
 
 /// Answer of a model to a configuration.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Prediction<const D: usize>
-where
-    Dim<D>: Space<D>,
-{
+pub struct Prediction<const D: usize> {
     /// Velocity and spin of each particle, in their order.
     pub twists: Vec<Twist<D>>,
     /// Shear rate over that by which velocities count, where the stress is given and the rate follows; one
@@ -76,10 +67,7 @@ where
     pub statistics: FlowStatistics,
 }
 
-impl<const D: usize> Prediction<D>
-where
-    Dim<D>: Space<D>,
-{
+impl<const D: usize> Prediction<D> {
     /// Free particles with these velocities, and nothing else.
     pub fn of(twists: Vec<Twist<D>>) -> Self {
         Self { twists, rate: 1.0, stress: None, holding: None, statistics: FlowStatistics::default() }
@@ -87,10 +75,7 @@ where
 }
 
 /// Predicts the velocities of particles from their positions, without contact.
-pub trait Hydrodynamics<const D: usize>
-where
-    Dim<D>: Space<D>,
-{
+pub trait Hydrodynamics<const D: usize> {
     /// Why a prediction failed.
     type Error: std::error::Error + Send + Sync + 'static;
 
@@ -130,10 +115,7 @@ where
 
 /// Support of particles that move as they are told: what holds or drives them.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Holding<const D: usize>
-where
-    Dim<D>: Space<D>,
-{
+pub struct Holding<const D: usize> {
     /// Mean velocity of fluid and particles over the box, in a sheared one less that of the shear.
     pub mean_velocity: Vector<D>,
     /// Uniform force per unit of volume on fluid and particles: minus the mean gradient of the pressure.

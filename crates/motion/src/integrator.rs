@@ -7,7 +7,7 @@
 use std::fmt;
 
 use gluey_contact::BodyStep;
-use gluey_geom::{Dim, Particle, Space, Twist, Vector};
+use gluey_geom::{Dim, Particle, Twist, Vector};
 #[cfg(feature = "serde")]
 use serde::{Deserialize, Serialize};
 
@@ -39,10 +39,7 @@ impl fmt::Display for Scheme {
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(Serialize, Deserialize))]
 #[cfg_attr(feature = "serde", serde(bound = ""))]
-pub struct Integrator<const D: usize>
-where
-    Dim<D>: Space<D>,
-{
+pub struct Integrator<const D: usize> {
     scheme: Scheme,
     /// `u^{n-1}`; empty before the first step.
     history: Vec<Twist<D>>,
@@ -50,10 +47,7 @@ where
     history_age: f64,
 }
 
-impl<const D: usize> Integrator<D>
-where
-    Dim<D>: Space<D>,
-{
+impl<const D: usize> Integrator<D> {
     /// An integrator without history.
     pub fn new(scheme: Scheme) -> Self {
         Self { scheme, history: Vec::new(), history_age: 0.0 }

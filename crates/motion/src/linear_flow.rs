@@ -1,6 +1,6 @@
 //! Linear flows `u(x) = L (x - x0)`, and particles that simply follow them.
 
-use gluey_geom::{Dim, Matrix, Space, Spin, Twist, Vector};
+use gluey_geom::{Dim, Matrix, Spin, Twist, Vector};
 #[cfg(feature = "serde")]
 use serde::{Deserialize, Serialize};
 
@@ -16,10 +16,7 @@ pub struct LinearFlow<const D: usize> {
     pub origin: Vector<D>,
 }
 
-impl<const D: usize> LinearFlow<D>
-where
-    Dim<D>: Space<D>,
-{
+impl<const D: usize> LinearFlow<D> {
     /// Simple shear `u = rate (y - y0) e_x`.
     pub fn shear(rate: f64, y0: f64) -> Self {
         let mut gradient = Matrix::<D>::zeros();
@@ -73,10 +70,7 @@ impl<const D: usize> BackgroundFlow<D> {
     }
 }
 
-impl<const D: usize> Hydrodynamics<D> for BackgroundFlow<D>
-where
-    Dim<D>: Space<D>,
-{
+impl<const D: usize> Hydrodynamics<D> for BackgroundFlow<D> {
     type Error = NoForces;
 
     fn predict(&mut self, configuration: &Configuration<'_, D>) -> Result<Prediction<D>, NoForces> {

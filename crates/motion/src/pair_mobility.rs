@@ -7,7 +7,7 @@
 use std::f64::consts::PI;
 
 use gluey_contact::{Film, PairKey};
-use gluey_geom::{Dim, Particle, Space, Twist, Vector, Wrench};
+use gluey_geom::{Dim, Particle, Twist, Vector, Wrench};
 
 use crate::{Configuration, Hydrodynamics, LinearFlow, MobilityTable, Prediction, approach_mobility};
 

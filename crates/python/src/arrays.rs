@@ -1,7 +1,7 @@
 //! Arrays of numpy as vectors, spins and matrices, and back. All are contiguous and of `float64`: the package
 //! sees to that.
 
-use gluey_geom::{Dim, Matrix, Space, Spin, Vector};
+use gluey_geom::{Dim, Matrix, Spin, Vector};
 use numpy::{PyArray, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
@@ -24,10 +24,7 @@ pub fn vectors<const D: usize>(array: &Numbers<'_>) -> PyResult<Vec<Vector<D>>> 
 }
 
 /// The rows of an `(N, 1)` array in 2D, `(N, 3)` in 3D.
-pub fn spins<const D: usize>(array: &Numbers<'_>) -> PyResult<Vec<Spin<D>>>
-where
-    Dim<D>: Space<D>,
-{
+pub fn spins<const D: usize>(array: &Numbers<'_>) -> PyResult<Vec<Spin<D>>> {
     let numbers = array.as_slice()?;
     let ((rows, columns), rotations) = (shape(array), Dim::<D>::ROT);
     if columns != rotations {
@@ -71,10 +68,7 @@ pub fn of_vectors<'py, const D: usize>(
 pub fn of_spins<'py, const D: usize>(
     py: Python<'py>,
     spins: impl IntoIterator<Item = Spin<D>>,
-) -> PyResult<Bound<'py, PyAny>>
-where
-    Dim<D>: Space<D>,
-{
+) -> PyResult<Bound<'py, PyAny>> {
     let numbers: Vec<f64> = spins.into_iter().flat_map(|spin| Dim::<D>::spin_slice(&spin).to_vec()).collect();
     let rows = numbers.len() / Dim::<D>::ROT;
     array(py, numbers, [rows, Dim::<D>::ROT])

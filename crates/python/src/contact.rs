@@ -6,7 +6,7 @@ use gluey_contact::{
     Contact, ContactModel, ContactParams, ContactReport, ContactState, Domain, GammaUpdate, PairKey,
     PairState, Partner, StepGeometry, Wall, WithFixed,
 };
-use gluey_geom::{Dim, Lattice, Space, Twist};
+use gluey_geom::{Lattice, Twist};
 use numpy::PyReadonlyArray1;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
@@ -131,10 +131,7 @@ impl PairContact {
     }
 }
 
-fn model<const D: usize>(parameters: &Parameters<'_>) -> PyResult<gluey_contact::PairContact<D, WithFixed>>
-where
-    Dim<D>: Space<D>,
-{
+fn model<const D: usize>(parameters: &Parameters<'_>) -> PyResult<gluey_contact::PairContact<D, WithFixed>> {
     let value_error = |error: String| PyValueError::new_err(error);
     let params = ContactParams {
         law: parameters
@@ -176,10 +173,7 @@ fn correct<'py, const D: usize>(
     py: Python<'py>,
     model: &mut gluey_contact::PairContact<D, WithFixed>,
     step: &StepArguments<'py>,
-) -> PyResult<Corrected<'py>>
-where
-    Dim<D>: Space<D>,
-{
+) -> PyResult<Corrected<'py>> {
     let (positions, drift) = (vectors::<D>(&step.positions)?, vectors::<D>(&step.drift)?);
     let radii = step.radii.as_slice()?;
     let velocities = vectors::<D>(&step.velocities)?;

@@ -4,7 +4,7 @@ use std::sync::{Mutex, PoisonError};
 
 use gluey::flow::prepared_flow;
 use gluey::{RunError, memory};
-use gluey_geom::{Dim, Matrix, Space, Twist, Vector, Wrench};
+use gluey_geom::{Matrix, Twist, Vector, Wrench};
 use gluey_stokes::motion::LinearFlow;
 use gluey_stokes::{Conditions, Flow, Prepared, StokesError};
 use pyo3::exceptions::PyValueError;
@@ -30,10 +30,7 @@ enum Flows {
 }
 
 /// Flows around particles in a box, in which the undisturbed velocity is that of a shear about its middle.
-struct Around<const D: usize>
-where
-    Dim<D>: Space<D>,
-{
+struct Around<const D: usize> {
     prepared: Prepared<'static, D>,
     middle: f64,
 }
@@ -85,10 +82,7 @@ impl Stokes {
     }
 }
 
-impl<const D: usize> Around<D>
-where
-    Dim<D>: Space<D>,
-{
+impl<const D: usize> Around<D> {
     fn solve<'py>(
         &mut self,
         py: Python<'py>,
@@ -143,10 +137,10 @@ where
 /// has none.
 type BodyMoments<const D: usize> = Option<[Vec<Matrix<D>>; 2]>;
 
-fn moments<const D: usize>(prepared: &Prepared<'_, D>, flow: &Flow<D>) -> Result<BodyMoments<D>, StokesError>
-where
-    Dim<D>: Space<D>,
-{
+fn moments<const D: usize>(
+    prepared: &Prepared<'_, D>,
+    flow: &Flow<D>,
+) -> Result<BodyMoments<D>, StokesError> {
     let of_mesh = match prepared.stresslets(flow) {
         Ok(stresslets) => stresslets,
         Err(StokesError::Unsupported { .. }) => return Ok(None),
@@ -161,10 +155,7 @@ fn of_flow<'py, const D: usize>(
     py: Python<'py>,
     flow: &Flow<D>,
     moments: BodyMoments<D>,
-) -> PyResult<Bound<'py, PyDict>>
-where
-    Dim<D>: Space<D>,
-{
+) -> PyResult<Bound<'py, PyDict>> {
     let dict = PyDict::new(py);
     dict.set_item("velocities", of_vectors(py, flow.twists.iter().map(|twist| twist.velocity))?)?;
     dict.set_item("spins", of_spins::<D>(py, flow.twists.iter().map(|twist| twist.spin))?)?;

@@ -7,7 +7,7 @@ use std::time::Duration;
 
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 use gluey_fem::TreeMesh;
-use gluey_geom::{Aabb, Dim, Space, Vector};
+use gluey_geom::{Aabb, Vector};
 use gluey_levelset::{Ball, Ramp};
 use gluey_linalg::{LinOp, Preconditioner};
 use gluey_stokes::{
@@ -45,18 +45,12 @@ fn mesh<const D: usize>(surface: u8, balls: &[Ball<D>]) -> TreeMesh<D> {
 }
 
 /// A problem with the residual of the undisturbed flow for its right-hand side.
-struct Case<const D: usize>
-where
-    Dim<D>: Space<D>,
-{
+struct Case<const D: usize> {
     problem: Problem<D>,
     b: Vec<f64>,
 }
 
-impl<const D: usize> Case<D>
-where
-    Dim<D>: Space<D>,
-{
+impl<const D: usize> Case<D> {
     /// A uniform mesh without bodies.
     fn empty(level: u8) -> Self {
         let mesh = TreeMesh::uniform(Aabb::unit(), [1; D], [false; D], level);
@@ -87,10 +81,7 @@ where
 }
 
 /// One application of the Stokes operator; throughput in unknowns.
-fn operator<const D: usize>(criterion: &mut Criterion, name: &str, case: &Case<D>)
-where
-    Dim<D>: Space<D>,
-{
+fn operator<const D: usize>(criterion: &mut Criterion, name: &str, case: &Case<D>) {
     let mut group = criterion.benchmark_group(format!("operator-{D}d"));
     group.throughput(Throughput::Elements(case.dofs()));
     let mut operator = SystemOperator::new(&case.problem.system);
@@ -101,10 +92,7 @@ where
 }
 
 /// One V-cycle on the velocities; throughput in unknowns.
-fn cycle<const D: usize>(criterion: &mut Criterion, name: &str, case: &Case<D>)
-where
-    Dim<D>: Space<D>,
-{
+fn cycle<const D: usize>(criterion: &mut Criterion, name: &str, case: &Case<D>) {
     let mut group = criterion.benchmark_group(format!("cycle-{D}d"));
     group.throughput(Throughput::Elements(case.dofs()));
     let mut solver = MultigridSolver::default();
@@ -117,10 +105,11 @@ where
 }
 
 /// Set-up of a solver, and a solve from zero to the tolerance; throughput in unknowns.
-fn solver<const D: usize, S: SaddleSolver<D> + Default>(criterion: &mut Criterion, name: &str, case: &Case<D>)
-where
-    Dim<D>: Space<D>,
-{
+fn solver<const D: usize, S: SaddleSolver<D> + Default>(
+    criterion: &mut Criterion,
+    name: &str,
+    case: &Case<D>,
+) {
     let mut group = criterion.benchmark_group(format!("solver-{D}d"));
     group.throughput(Throughput::Elements(case.dofs()));
     let mut solver = S::default();
@@ -146,9 +135,7 @@ fn step<const D: usize>(
     balls: Vec<Ball<D>>,
     surface: u8,
     dt: f64,
-) where
-    Dim<D>: Space<D>,
-{
+) {
     let mut solver = FlowSolver::<D>::new(params).expect("the parameters are in range");
     let mut flow = |balls: &[Ball<D>]| {
         solver.solve(mesh(surface, balls), balls, &couette).expect("the bodies are resolved")

@@ -8,7 +8,7 @@ use std::fmt::Debug;
 use std::sync::Arc;
 
 use gluey_fem::ReferenceMatrices;
-use gluey_geom::{Dim, Matrix, Space, Vector, Wrench};
+use gluey_geom::{Dim, Matrix, Vector, Wrench};
 
 use crate::space::VelocitySpace;
 
@@ -35,8 +35,6 @@ pub trait Product<X, T> {
 /// A term of the Stokes operator.
 pub trait Term<const D: usize>:
     Product<f64, f64> + Product<f32, f64> + Product<f32, f32> + Any + Debug + Send + Sync
-where
-    Dim<D>: Space<D>,
 {
     /// Whether a cell of the mesh is none of the fluid's own, since what is in it belongs to the term.
     fn covers(&self, _cell: usize) -> bool {
@@ -87,10 +85,7 @@ where
 }
 
 /// A right-hand side before constraints are taken into account.
-pub struct Load<const D: usize>
-where
-    Dim<D>: Space<D>,
-{
+pub struct Load<const D: usize> {
     /// On the velocities of all nodes.
     pub velocity: Vec<f64>,
     /// On the pressures of all nodes.
@@ -106,7 +101,6 @@ pub fn add_terms<X, T, const D: usize>(
     [yu, yp, mut z]: [&mut [X]; 3],
     scratch: &mut Scratch<T>,
 ) where
-    Dim<D>: Space<D>,
     dyn Term<D>: Product<X, T>,
 {
     for term in terms {
@@ -118,9 +112,6 @@ pub fn add_terms<X, T, const D: usize>(
 }
 
 /// Rows of the matrix of a piece.
-pub fn piece_size<const D: usize>() -> usize
-where
-    Dim<D>: Space<D>,
-{
+pub fn piece_size<const D: usize>() -> usize {
     ReferenceMatrices::<D>::VELOCITY + ReferenceMatrices::<D>::PRESSURE + Dim::<D>::RIGID
 }

@@ -1,7 +1,7 @@
 //! An application of the preconditioner allocates nothing.
 
 use gluey_fem::TreeMesh;
-use gluey_geom::{Aabb, Dim, Space, Vector};
+use gluey_geom::{Aabb, Vector};
 use gluey_levelset::Ball;
 use gluey_linalg::Preconditioner;
 use gluey_stokes::{
@@ -13,10 +13,7 @@ use gluey_testkit::allocation::{CountingAllocator, count_in_all_threads};
 static ALLOCATOR: CountingAllocator = CountingAllocator;
 
 /// Two balls whose cells meet: bodies near each other have the most parts of the preconditioner.
-fn problem<const D: usize>(formulation: Formulation) -> Problem<D>
-where
-    Dim<D>: Space<D>,
-{
+fn problem<const D: usize>(formulation: Formulation) -> Problem<D> {
     let (radius, level) = if D == 2 { (0.1, 6) } else { (0.14, 5) };
     let balls = [-1.0, 1.0].map(|side| {
         let mut centre = Vector::<D>::repeat(0.49);
@@ -29,10 +26,7 @@ where
     Problem::new(mesh, &balls, 1.0, formulation).expect("the bodies are resolved")
 }
 
-fn steady_work_allocates_nothing<const D: usize>(formulation: Formulation)
-where
-    Dim<D>: Space<D>,
-{
+fn steady_work_allocates_nothing<const D: usize>(formulation: Formulation) {
     let problem = problem::<D>(formulation);
     let (mut solver, system) = (MultigridSolver::default(), &problem.system);
     solver.prepare(&problem).expect("the system can be inverted");

@@ -1,17 +1,14 @@
 //! Periodic boxes: where the border lies does not matter.
 
 use gluey_fem::TreeMesh;
-use gluey_geom::{Aabb, Dim, Space, Twist, Vector};
+use gluey_geom::{Aabb, Dim, Twist, Vector};
 use gluey_levelset::Ball;
 use gluey_stokes::{FlowParams, FlowSolver, Formulation, Lubrication, PaperParams, Refinement, SolverKind};
 
 const REFINEMENT: Refinement = Refinement { coarsest: 3, surface: 5, band: 2.0 };
 
 /// The motion of a ball at `x`, in a box that is periodic in all directions but y.
-fn motion<const D: usize>(x: f64, params: FlowParams) -> Twist<D>
-where
-    Dim<D>: Space<D>,
-{
+fn motion<const D: usize>(x: f64, params: FlowParams) -> Twist<D> {
     let periodic: [bool; D] = std::array::from_fn(|d| d != 1);
     let mut center = Vector::<D>::repeat(0.5);
     (center[0], center[1]) = (x, 0.61);
@@ -26,10 +23,7 @@ where
     solver.solve(mesh, &[ball], &shear).expect("a flow").twists[0]
 }
 
-fn crossing_the_border_changes_nothing<const D: usize>(formulation: Formulation, solver: SolverKind)
-where
-    Dim<D>: Space<D>,
-{
+fn crossing_the_border_changes_nothing<const D: usize>(formulation: Formulation, solver: SolverKind) {
     let params = FlowParams { viscosity: 1.0, formulation, solver, tolerance: 1e-9 };
     let (inside, across) = (motion::<D>(0.47, params), motion::<D>(0.97, params));
     let (spin, other) = (Dim::<D>::spin_slice(&inside.spin), Dim::<D>::spin_slice(&across.spin));

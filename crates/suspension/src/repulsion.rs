@@ -7,7 +7,7 @@
 //! surface of infinite radius.
 
 use gluey_contact::Domain;
-use gluey_geom::{Dim, Matrix, Particle, Space, Vector};
+use gluey_geom::{Matrix, Particle, Vector};
 
 use crate::{Container, for_each_pair};
 
@@ -61,10 +61,7 @@ impl Repulsion {
     /// Forces between particles, images and walls where they are; at a cost proportional to the number of
     /// particles. Positions need not be wrapped. In a small box particles repel more than one image of each
     /// other, and those of themselves.
-    pub fn between<const D: usize>(&self, particles: &[Particle<D>], domain: &Domain<D>) -> Repelled<D>
-    where
-        Dim<D>: Space<D>,
-    {
+    pub fn between<const D: usize>(&self, particles: &[Particle<D>], domain: &Domain<D>) -> Repelled<D> {
         let mut forces = vec![Vector::zeros(); particles.len()];
         let mut moment = Matrix::zeros();
         let centers: Vec<Vector<D>> = particles.iter().map(|particle| particle.pose.position).collect();
@@ -104,10 +101,7 @@ mod tests {
 
     const LAW: Repulsion = Repulsion { force: 3.0, range: 0.02, radius: 0.1 };
 
-    fn particles<const D: usize>(spread: f64) -> Vec<Particle<D>>
-    where
-        Dim<D>: Space<D>,
-    {
+    fn particles<const D: usize>(spread: f64) -> Vec<Particle<D>> {
         let mut random = ChaCha8Rng::seed_from_u64(7);
         (0..24)
             .map(|_| {
@@ -118,10 +112,7 @@ mod tests {
     }
 
     /// Forces and their moment by a look at every image of every pair.
-    fn by_all_pairs<const D: usize>(particles: &[Particle<D>], domain: &Domain<D>) -> Repelled<D>
-    where
-        Dim<D>: Space<D>,
-    {
+    fn by_all_pairs<const D: usize>(particles: &[Particle<D>], domain: &Domain<D>) -> Repelled<D> {
         let mut forces = vec![Vector::zeros(); particles.len()];
         let mut moment = Matrix::zeros();
         for (i, a) in particles.iter().enumerate() {
@@ -142,10 +133,7 @@ mod tests {
         Repelled { forces, moment }
     }
 
-    fn agrees<const D: usize>()
-    where
-        Dim<D>: Space<D>,
-    {
+    fn agrees<const D: usize>() {
         let mut domain = Domain::periodic(&Vector::<D>::repeat(1.0));
         let particles = particles::<D>(1.0);
         for tilt in [0.0, 0.3, -0.6] {
@@ -170,10 +158,7 @@ mod tests {
         agrees::<3>();
     }
 
-    fn is_that_of_images<const D: usize>()
-    where
-        Dim<D>: Space<D>,
-    {
+    fn is_that_of_images<const D: usize>() {
         let mut domain = Domain::periodic(&Vector::<D>::repeat(1.0));
         domain.set_sliding(0.7, 0.0);
         let here = particles::<D>(3.0);

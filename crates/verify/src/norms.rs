@@ -1,6 +1,6 @@
 //! Errors of a flow in the fluid, and the stresslet of a body from the boundary data around it.
 
-use gluey_geom::{Aabb, Dim, Matrix, Space, Vector};
+use gluey_geom::{Aabb, Matrix, Vector};
 use gluey_levelset::{Ball, Body, LevelSet};
 use gluey_stokes::fem::cut::{BallInCell, CutRules, FlatInCell, POINTS};
 use gluey_stokes::fem::element::{gauss_cube, gradient, node_count, value};
@@ -21,10 +21,7 @@ pub struct Errors {
 }
 
 /// The errors of `flow`, by a Gauss rule on every cell that leaves out points inside the balls.
-pub fn errors<const D: usize>(flow: &Flow<D>, exact: &impl StokesSolution<D>, balls: &[Ball<D>]) -> Errors
-where
-    Dim<D>: Space<D>,
-{
+pub fn errors<const D: usize>(flow: &Flow<D>, exact: &impl StokesSolution<D>, balls: &[Ball<D>]) -> Errors {
     let rule = gauss_cube::<D>(4);
     let mesh = &flow.discretisation.mesh;
     let (mut du_square, mut u_square) = (0.0, 0.0);
@@ -64,10 +61,11 @@ fn is_fluid<const D: usize>(x: &Vector<D>, balls: &[Ball<D>]) -> bool {
     balls.iter().all(|ball| ball.value(x) < 0.0)
 }
 
-fn largest_at_nodes<const D: usize>(flow: &Flow<D>, exact: &impl StokesSolution<D>, balls: &[Ball<D>]) -> f64
-where
-    Dim<D>: Space<D>,
-{
+fn largest_at_nodes<const D: usize>(
+    flow: &Flow<D>,
+    exact: &impl StokesSolution<D>,
+    balls: &[Ball<D>],
+) -> f64 {
     let nodes = &flow.discretisation.velocity;
     let (mut error, mut largest): (f64, f64) = (0.0, 0.0);
     for n in (0..nodes.node_count()).filter(|&n| is_fluid(&nodes.point(n), balls)) {
@@ -82,28 +80,23 @@ fn nodal<const D: usize>(velocity: &[f64], node: usize) -> Vector<D> {
     Vector::from_column_slice(&velocity[node * D..][..D])
 }
 
-fn velocity_at<const D: usize>(flow: &Flow<D>, cell: usize, at: &[f64; D]) -> Vector<D>
-where
-    Dim<D>: Space<D>,
-{
+fn velocity_at<const D: usize>(flow: &Flow<D>, cell: usize, at: &[f64; D]) -> Vector<D> {
     let nodes = flow.discretisation.velocity.cell(cell).iter().enumerate();
     nodes.map(|(i, &n)| nodal::<D>(&flow.velocity, n as usize) * value::<D>(2, i, at)).sum()
 }
 
-fn pressure_at<const D: usize>(flow: &Flow<D>, cell: usize, at: &[f64; D]) -> f64
-where
-    Dim<D>: Space<D>,
-{
+fn pressure_at<const D: usize>(flow: &Flow<D>, cell: usize, at: &[f64; D]) -> f64 {
     let nodes = flow.discretisation.pressure.cell(cell).iter().enumerate();
     nodes.map(|(i, &n)| flow.pressure[n as usize] * value::<D>(1, i, at)).sum()
 }
 
 /// The integral of the velocity over the fluid around bodies, which repeat where the box is periodic, over
 /// the volume of the box. Films between bodies are widened to these heights, as the mesh sees them.
-pub fn superficial_velocity<const D: usize>(flow: &Flow<D>, balls: &[Ball<D>], heights: &Heights) -> Vector<D>
-where
-    Dim<D>: Space<D>,
-{
+pub fn superficial_velocity<const D: usize>(
+    flow: &Flow<D>,
+    balls: &[Ball<D>],
+    heights: &Heights,
+) -> Vector<D> {
     let mesh = &flow.discretisation.mesh;
     let (points, rules) = (gauss_cube::<D>(POINTS), CutRules::new(0.0));
     let flats = flats(balls, mesh.domain(), heights);
@@ -219,10 +212,7 @@ impl<const D: usize> Lattice<D> {
         flow: &Flow<D>,
         boundary: &dyn Fn(&Vector<D>) -> Vector<D>,
         strain: &Matrix<D>,
-    ) -> f64
-    where
-        Dim<D>: Space<D>,
-    {
+    ) -> f64 {
         let center = self.domain.center();
         let nodes = &flow.discretisation.velocity;
         let test = |node: u32| {
@@ -243,10 +233,7 @@ impl<const D: usize> Lattice<D> {
 }
 
 /// `int 2 eps(u):eps(v) - p div v` over a cell of pure fluid for the field with the nodal values `tests`.
-fn virtual_work<const D: usize>(flow: &Flow<D>, cell: usize, tests: &[Vector<D>]) -> f64
-where
-    Dim<D>: Space<D>,
-{
+fn virtual_work<const D: usize>(flow: &Flow<D>, cell: usize, tests: &[Vector<D>]) -> f64 {
     let h = flow.discretisation.cell_size(cell);
     let nodes = flow.discretisation.velocity.cell(cell);
     let work = |(at, weight): ([f64; D], f64)| {

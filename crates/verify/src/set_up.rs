@@ -2,7 +2,7 @@
 
 use std::f64::consts::PI;
 
-use gluey_geom::{Aabb, Dim, Matrix, Space, Spin, Twist, Vector};
+use gluey_geom::{Aabb, Dim, Matrix, Spin, Twist, Vector};
 use gluey_levelset::Ball;
 use gluey_stokes::fem::TreeMesh;
 use gluey_stokes::{Flow, FlowSolver, Refinement, Stress};
@@ -29,10 +29,7 @@ pub fn solve<const D: usize>(
     mesh: TreeMesh<D>,
     balls: &[Ball<D>],
     boundary: &dyn Fn(&Vector<D>) -> Vector<D>,
-) -> Result<Flow<D>, VerifyError>
-where
-    Dim<D>: Space<D>,
-{
+) -> Result<Flow<D>, VerifyError> {
     Ok(FlowSolver::new(method.params::<D>(tolerance))?.solve(mesh, balls, boundary)?)
 }
 
@@ -75,10 +72,7 @@ pub fn simple_shear<const D: usize>() -> Matrix<D> {
 ///
 /// # Errors
 /// [`VerifyError::NoReference`] for one that was not.
-pub fn stress_of<const D: usize>(flow: &Flow<D>) -> Result<&Stress<D>, VerifyError>
-where
-    Dim<D>: Space<D>,
-{
+pub fn stress_of<const D: usize>(flow: &Flow<D>) -> Result<&Stress<D>, VerifyError> {
     flow.stress.as_ref().ok_or_else(|| VerifyError::NoReference("the stress".to_owned()))
 }
 
@@ -157,10 +151,7 @@ pub struct PairMotion {
 
 impl PairMotion {
     /// That of two balls at these centres.
-    pub fn of<const D: usize>(centers: [Vector<D>; 2], twists: &[Twist<D>]) -> Self
-    where
-        Dim<D>: Space<D>,
-    {
+    pub fn of<const D: usize>(centers: [Vector<D>; 2], twists: &[Twist<D>]) -> Self {
         let line = centers[1] - centers[0];
         let e = line.normalize();
         let relative = twists[1].velocity - twists[0].velocity;

@@ -24,7 +24,6 @@ use gluey::output::product_names::is_table;
 use gluey::output::{FileError, prepare_folder_of, rows_of, write_atomically};
 use gluey::rheology::{RheologyError, RheologyMeans};
 use gluey_contact::ContactError;
-use gluey_geom::{Dim, Space};
 use gluey_suspension::statistics::mser;
 use thiserror::Error;
 
@@ -101,10 +100,7 @@ pub fn analyse(options: &AnalyseOptions) -> Result<StructureSummary, AnalyseErro
 fn analyse_in<const D: usize>(
     options: &AnalyseOptions,
     files: &[PathBuf],
-) -> Result<StructureSummary, AnalyseError>
-where
-    Dim<D>: Space<D>,
-{
+) -> Result<StructureSummary, AnalyseError> {
     let frames = read_frames::<D>(files)?;
     let series: Vec<FrameNumbers<D>> = frames
         .iter()

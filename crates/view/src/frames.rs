@@ -4,7 +4,6 @@ use std::path::{Path, PathBuf};
 
 use gluey::output::xyz::{self, XyzError, XyzFrame, read_text};
 use gluey::output::{FileError, entries, name_of};
-use gluey_geom::{Dim, Space};
 use thiserror::Error;
 
 /// Frames could not be found or read.
@@ -91,10 +90,7 @@ pub fn dimension(files: &[PathBuf]) -> Result<usize, FramesError> {
 }
 
 /// All frames; each has the particles and the box of the first, whatever its tilt.
-pub fn read_frames<const D: usize>(files: &[PathBuf]) -> Result<Vec<XyzFrame<D>>, FramesError>
-where
-    Dim<D>: Space<D>,
-{
+pub fn read_frames<const D: usize>(files: &[PathBuf]) -> Result<Vec<XyzFrame<D>>, FramesError> {
     let mut frames: Vec<XyzFrame<D>> = Vec::with_capacity(files.len());
     for path in files {
         let frame = XyzFrame::parse(path, &read_text(path)?)?;

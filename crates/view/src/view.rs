@@ -9,7 +9,6 @@ use std::path::{Path, PathBuf};
 use gluey::output::product_names::PAGE_NAME;
 use gluey::output::xyz::XyzFrame;
 use gluey::output::{FileError, name_of, prepare_folder_of, write_atomically};
-use gluey_geom::{Dim, Space};
 use serde::Serialize;
 use thiserror::Error;
 
@@ -107,10 +106,7 @@ struct PageFrame {
 
 impl PageRun {
     /// All frames have the radii and the box of the first.
-    fn of<const D: usize>(title: String, frames: &[XyzFrame<D>]) -> Self
-    where
-        Dim<D>: Space<D>,
-    {
+    fn of<const D: usize>(title: String, frames: &[XyzFrame<D>]) -> Self {
         let (container, radii) = (&frames[0].container, &frames[0].radii);
         let bounds = container.bounds();
         Self {
@@ -134,10 +130,7 @@ impl PageRun {
 }
 
 impl PageFrame {
-    fn of<const D: usize>(frame: &XyzFrame<D>) -> Self
-    where
-        Dim<D>: Space<D>,
-    {
+    fn of<const D: usize>(frame: &XyzFrame<D>) -> Self {
         let flat = |vectors: &[gluey_geom::Vector<D>]| {
             vectors.iter().flat_map(|vector| triple(vector.as_slice())).collect::<Vec<f32>>()
         };

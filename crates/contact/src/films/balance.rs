@@ -15,7 +15,7 @@
 //! they are, then about where they went, until they are exact. The distance of centres is convex in `x`: gaps
 //! are never below those linearised.
 
-use gluey_geom::{Dim, Space, Vector};
+use gluey_geom::Vector;
 
 use super::error::FilmError;
 use super::film::FilmLaw;
@@ -38,10 +38,7 @@ pub(super) fn balance<'a, const D: usize>(
     step: &BodyStep<'_, D>,
     free: &'a [Vector<D>],
     laws: Vec<FilmLaw<'a, D>>,
-) -> Result<Balance<'a, D>, FilmError>
-where
-    Dim<D>: Space<D>,
-{
+) -> Result<Balance<'a, D>, FilmError> {
     let params = ContactParams { exact_gap: true, pass_limit: MOST_PASSES, ..ContactParams::default() };
     let (mut problem, mut effort) = (Balance::new(step, free, laws), Effort::default());
     match projection::solve(&mut problem, &params, &mut effort) {
@@ -67,10 +64,7 @@ pub(super) struct Balance<'a, const D: usize> {
 }
 
 impl<'a, const D: usize> Balance<'a, D> {
-    fn new(step: &BodyStep<'_, D>, free: &'a [Vector<D>], laws: Vec<FilmLaw<'a, D>>) -> Self
-    where
-        Dim<D>: Space<D>,
-    {
+    fn new(step: &BodyStep<'_, D>, free: &'a [Vector<D>], laws: Vec<FilmLaw<'a, D>>) -> Self {
         let mut weights = vec![0.0];
         weights.extend(step.radii.iter().map(|radius| 1.0 / radius));
         for film in laws.iter().map(|law| law.film) {

@@ -1,6 +1,6 @@
 //! A film between two particles, and how it resists.
 
-use gluey_geom::{Dim, Space, Twist, Vector};
+use gluey_geom::{Twist, Vector};
 
 use crate::neighbours::{AffineFit, KnownMotion};
 use crate::rows::{GROUND, Row};
@@ -46,10 +46,7 @@ const THINNEST: f64 = 1e-9;
 /// The gap up to which films have to be known before a step with these velocities. Where images slide in a
 /// simple shear of this rate displacements count from the sheared lattice, in which particles move little
 /// against each other, however far up in `y` they are.
-pub fn film_reach<const D: usize>(step: &BodyStep<'_, D>, twists: &[Twist<D>], rate: f64) -> f64
-where
-    Dim<D>: Space<D>,
-{
+pub fn film_reach<const D: usize>(step: &BodyStep<'_, D>, twists: &[Twist<D>], rate: f64) -> f64 {
     let shear = rate * step.dt;
     let centers: Vec<Vector<D>> = step.poses.iter().map(|pose| pose.position).collect();
     let moves = step.moves(twists);

@@ -28,7 +28,7 @@ pub use error::FilmError;
 pub use film::{Film, film_reach};
 use opening::open;
 
-use gluey_geom::{Dim, Space, Twist};
+use gluey_geom::Twist;
 #[cfg(feature = "serde")]
 use serde::{Deserialize, Serialize};
 
@@ -93,10 +93,7 @@ impl FilmMemory {
         step: &BodyStep<'_, D>,
         films: &[Film<D>],
         twists: &mut [Twist<D>],
-    ) -> Result<FilmReport, FilmError>
-    where
-        Dim<D>: Space<D>,
-    {
+    ) -> Result<FilmReport, FilmError> {
         let (weight, old_weight) = (step.velocity_weight, step.dt - step.velocity_weight);
         let asked = |film: &Film<D>| {
             let gap = film.gap.max(film.thinnest());

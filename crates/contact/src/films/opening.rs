@@ -1,6 +1,6 @@
 //! Keeps the films of a step open.
 
-use gluey_geom::{Dim, Space, Vector};
+use gluey_geom::Vector;
 
 use super::balance::balance;
 use super::error::FilmError;
@@ -21,10 +21,7 @@ pub(super) fn open<const D: usize>(
     films: &[Film<D>],
     states: &mut [PairState],
     free: &[Vector<D>],
-) -> Result<Vec<Vector<D>>, FilmError>
-where
-    Dim<D>: Space<D>,
-{
+) -> Result<Vec<Vector<D>>, FilmError> {
     let rows: Vec<Row<D>> = films.iter().map(|film| film.row(step.dt)).collect();
     let gap = |k: usize, moved: &[Vector<D>]| rows[k].gap_at(&rows[k].between(|place| moved[place as usize]));
     let is_near = |k: usize, moved: &[Vector<D>], share: f64| {

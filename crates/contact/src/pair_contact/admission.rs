@@ -1,7 +1,7 @@
 //! Admission of candidates to a step: those that remember, those that would close, and those that others
 //! would push together.
 
-use gluey_geom::{Dim, Space, Vector};
+use gluey_geom::Vector;
 
 use super::{Buffers, PairContact, PairMemory, Participation};
 use crate::neighbours::Candidate;
@@ -9,10 +9,7 @@ use crate::parallel;
 use crate::rows::{Row, closes};
 use crate::{ContactError, Domain, Mobility, PairState, StepGeometry};
 
-impl<const D: usize, M: Mobility<D>> PairContact<D, M>
-where
-    Dim<D>: Space<D>,
-{
+impl<const D: usize, M: Mobility<D>> PairContact<D, M> {
     /// Sets up the pairs that remember and those that would close.
     pub(super) fn begin(
         &mut self,

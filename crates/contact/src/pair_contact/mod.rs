@@ -4,7 +4,7 @@ mod admission;
 mod part;
 mod velocity_correction;
 
-use gluey_geom::{Dim, Space, Twist, Vector};
+use gluey_geom::{Twist, Vector};
 
 use crate::island_projection::{IslandWorkspace, SolveContext};
 use crate::islands::{Grouping, Island, Islands, SortedParticles};
@@ -44,10 +44,7 @@ pub struct Centers<const D: usize> {
     drift: Vec<Vector<D>>,
 }
 
-impl<const D: usize> Centers<D>
-where
-    Dim<D>: Space<D>,
-{
+impl<const D: usize> Centers<D> {
     /// The step without its rotations.
     pub fn of<'a>(&'a mut self, step: &BodyStep<'a, D>) -> StepGeometry<'a, D> {
         self.positions.clear();
@@ -140,10 +137,7 @@ impl<const D: usize, M: Mobility<D>> PairContact<D, M> {
     }
 }
 
-impl<const D: usize, M: Mobility<D>> PairContact<D, M>
-where
-    Dim<D>: Space<D>,
-{
+impl<const D: usize, M: Mobility<D>> PairContact<D, M> {
     /// Corrects `twists`; on an error they and the memory are as before. [`ContactModel::correct_bodies`]
     /// does the same for a step that is given with orientations.
     pub fn correct(
@@ -162,10 +156,7 @@ where
     }
 }
 
-impl<const D: usize, M: Mobility<D>> ContactModel<D> for PairContact<D, M>
-where
-    Dim<D>: Space<D>,
-{
+impl<const D: usize, M: Mobility<D>> ContactModel<D> for PairContact<D, M> {
     fn correct_bodies(
         &mut self,
         step: &BodyStep<'_, D>,
@@ -204,10 +195,7 @@ enum Coverage {
     Incomplete,
 }
 
-impl<const D: usize, M: Mobility<D>> PairContact<D, M>
-where
-    Dim<D>: Space<D>,
-{
+impl<const D: usize, M: Mobility<D>> PairContact<D, M> {
     fn step(
         &mut self,
         step: &StepGeometry<'_, D>,
@@ -407,9 +395,6 @@ where
 fn free_moves<'a, const D: usize>(
     step: &'a StepGeometry<'_, D>,
     twists: &'a [Twist<D>],
-) -> impl Iterator<Item = Vector<D>> + 'a
-where
-    Dim<D>: Space<D>,
-{
+) -> impl Iterator<Item = Vector<D>> + 'a {
     twists.iter().zip(step.drift).map(|(twist, drift)| twist.velocity * step.velocity_weight + drift)
 }

@@ -1,6 +1,6 @@
 //! The contact step of one of several ranks, on its own particles and copies of others.
 
-use gluey_geom::{Dim, Space, Twist, Vector};
+use gluey_geom::{Twist, Vector};
 
 use super::{Buffers, PairContact, PairMemory, Participation, free_moves};
 use crate::island_projection::{IslandWorkspace, SharedContext};
@@ -66,10 +66,7 @@ struct Particles<const D: usize> {
     ownership: Ownership,
 }
 
-impl<const D: usize, M: Mobility<D>> PartContact<D, M>
-where
-    Dim<D>: Space<D>,
-{
+impl<const D: usize, M: Mobility<D>> PartContact<D, M> {
     /// What `alone` does in one process.
     pub fn new(alone: PairContact<D, M>) -> Self {
         Self {

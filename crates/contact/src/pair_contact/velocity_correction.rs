@@ -1,16 +1,11 @@
 //! The contact law without a projection: pairs are pushed apart one after the other.
 
-use gluey_geom::{Dim, Space};
-
 use super::{Buffers, Coverage, PairContact, Participation};
 use crate::push_apart::{Pushed, push_apart};
 use crate::solver::SolveReport;
 use crate::{ContactError, ContactParams, ContactReport, Mobility, StepGeometry};
 
-impl<const D: usize, M: Mobility<D>> PairContact<D, M>
-where
-    Dim<D>: Space<D>,
-{
+impl<const D: usize, M: Mobility<D>> PairContact<D, M> {
     /// The velocity correction: no projection.
     pub(super) fn push(
         &mut self,

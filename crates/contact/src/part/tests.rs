@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use gluey_geom::{Dim, Space, Twist, Vector};
+use gluey_geom::{Twist, Vector};
 use gluey_testkit::packing::Packing;
 
 use super::{PartContact, RankOf, RankShare};
@@ -12,10 +12,7 @@ use crate::{ContactParams, Domain, PairContact, PairKey, StepGeometry, Wall};
 const SIZES: [usize; 7] = [1, 2, 3, 4, 8, 13, 64];
 
 /// Particles, their radii and how they are to move.
-struct Cloud<const D: usize>
-where
-    Dim<D>: Space<D>,
-{
+struct Cloud<const D: usize> {
     positions: Vec<Vector<D>>,
     radii: Vec<f64>,
     twists: Vec<Twist<D>>,
@@ -23,10 +20,7 @@ where
     domain: Domain<D>,
 }
 
-impl<const D: usize> Cloud<D>
-where
-    Dim<D>: Space<D>,
-{
+impl<const D: usize> Cloud<D> {
     fn new(count: usize, sizes: [f64; 3], domain: impl Fn(f64) -> Domain<D>) -> Self {
         let packing = Packing::<D>::fluid(count, 0.3, 3);
         let flow = |(k, x): (usize, &Vector<D>)| {
@@ -115,10 +109,7 @@ where
     }
 }
 
-fn in_all_surroundings<const D: usize>(count: usize, sizes: [f64; 3])
-where
-    Dim<D>: Space<D>,
-{
+fn in_all_surroundings<const D: usize>(count: usize, sizes: [f64; 3]) {
     let up = Vector::<D>::from_fn(|d, _| f64::from(u8::from(d == 1)));
     let wall = |normal: Vector<D>, offset: f64| Wall { normal, offset, speed: 0.2 };
     let walls = |side: f64| {

@@ -1,15 +1,12 @@
 //! The bodies of a step: shapes, displacements without contact, mobilities.
 
-use gluey_geom::{Dim, Space, Twist, Vector};
+use gluey_geom::{Twist, Vector};
 
 use super::Shape;
 use crate::{BodyStep, ContactParams, Mobility};
 
 /// Bodies of a step and what is fixed in it.
-pub(super) struct Bodies<'a, const D: usize, S>
-where
-    Dim<D>: Space<D>,
-{
+pub(super) struct Bodies<'a, const D: usize, S> {
     pub shapes: &'a [S],
     pub step: &'a BodyStep<'a, D>,
     /// Displacements without contact.
@@ -18,10 +15,7 @@ where
     pub weights: Vec<[f64; 2]>,
 }
 
-impl<'a, const D: usize, S: Shape<D>> Bodies<'a, D, S>
-where
-    Dim<D>: Space<D>,
-{
+impl<'a, const D: usize, S: Shape<D>> Bodies<'a, D, S> {
     pub(super) fn new(
         shapes: &'a [S],
         step: &'a BodyStep<'a, D>,

@@ -1,15 +1,12 @@
 //! parry's closest points: coordinates cross the border as arrays, in units of the shapes' size, for parry's
 //! tolerances are absolute.
 
-use gluey_geom::{Dim, Matrix, Pose, Rotation, Space, Vector};
+use gluey_geom::{Dim, Matrix, Pose, Rotation, Vector};
 
 use super::Shape;
 
 /// Distance of the surfaces of two shapes; `None` if their cores meet.
-pub fn gap<const D: usize, S: Shape<D>>(shapes: [&S; 2], poses: [&Pose<D>; 2]) -> Option<f64>
-where
-    Dim<D>: Space<D>,
-{
+pub fn gap<const D: usize, S: Shape<D>>(shapes: [&S; 2], poses: [&Pose<D>; 2]) -> Option<f64> {
     let frames = poses.map(|pose| frame(&pose.orientation));
     let between = poses[1].position - poses[0].position;
     let [p, q] = closest(shapes, [&frames[0], &frames[1]], &between)?;
@@ -20,10 +17,7 @@ where
 const MEETING: f64 = 1e-12;
 
 /// The axes of the body in space, as columns.
-pub(super) fn frame<const D: usize>(orientation: &Rotation<D>) -> Matrix<D>
-where
-    Dim<D>: Space<D>,
-{
+pub(super) fn frame<const D: usize>(orientation: &Rotation<D>) -> Matrix<D> {
     let axis = |d: usize| Dim::<D>::rotate(orientation, &Vector::from_fn(|k, _| f64::from(u8::from(k == d))));
     Matrix::from_columns(&std::array::from_fn::<_, D, _>(axis))
 }

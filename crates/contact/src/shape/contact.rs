@@ -1,6 +1,6 @@
 //! The contact step of shapes: find pairs, project, re-linearise, remember.
 
-use gluey_geom::{Dim, Pose, Space, Twist, Vector};
+use gluey_geom::{Dim, Pose, Twist, Vector};
 
 use super::Shape;
 use super::bodies::Bodies;
@@ -57,10 +57,7 @@ impl<const D: usize, S: Shape<D>, M: Mobility<D>> ShapeContact<D, S, M> {
     }
 }
 
-impl<const D: usize, S: Shape<D>, M: Mobility<D>> ContactModel<D> for ShapeContact<D, S, M>
-where
-    Dim<D>: Space<D>,
-{
+impl<const D: usize, S: Shape<D>, M: Mobility<D>> ContactModel<D> for ShapeContact<D, S, M> {
     fn correct_bodies(
         &mut self,
         step: &BodyStep<'_, D>,
@@ -112,10 +109,7 @@ where
 }
 
 /// Widens the search where contact pushed bodies farther than partners were sought; whether it did.
-fn widen<const D: usize>(slacks: &mut [f64], moved: &[Twist<D>]) -> bool
-where
-    Dim<D>: Space<D>,
-{
+fn widen<const D: usize>(slacks: &mut [f64], moved: &[Twist<D>]) -> bool {
     let mut was_narrow = false;
     for (slack, moved) in slacks.iter_mut().zip(moved) {
         let distance = moved.velocity.norm();
@@ -132,10 +126,7 @@ fn near<const D: usize, S: Shape<D>>(
     bodies: &Bodies<'_, D, S>,
     state: &ContactState,
     slacks: &[f64],
-) -> Vec<(u32, u32)>
-where
-    Dim<D>: Space<D>,
-{
+) -> Vec<(u32, u32)> {
     let (centers, radii) = bodies.balls(slacks);
     let mut pairs = Vec::new();
     broadphase.meeting(&centers, &radii, centers.len(), &mut pairs);
@@ -154,10 +145,7 @@ fn validate<const D: usize, S: Shape<D>>(
     step: &BodyStep<'_, D>,
     twists: &[Twist<D>],
     state: &ContactState,
-) -> Result<(), ContactError>
-where
-    Dim<D>: Space<D>,
-{
+) -> Result<(), ContactError> {
     let count = step.poses.len();
     validate_sizes([count, shapes.len(), step.drift.len(), twists.len()], step.velocity_weight, step.dt)?;
     for particle in 0..count {
@@ -179,10 +167,7 @@ where
 }
 
 /// The first quantity of a body that is infinite or not a number.
-fn not_finite<const D: usize>(pose: &Pose<D>, twist: &Twist<D>, drift: &Twist<D>) -> Option<&'static str>
-where
-    Dim<D>: Space<D>,
-{
+fn not_finite<const D: usize>(pose: &Pose<D>, twist: &Twist<D>, drift: &Twist<D>) -> Option<&'static str> {
     let linear = |x: &Vector<D>| x.iter().all(|x| x.is_finite());
     let angular = |twist: &Twist<D>| Dim::<D>::spin_slice(&twist.spin).iter().all(|x| x.is_finite());
     let quantities = [

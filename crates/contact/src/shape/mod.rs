@@ -37,7 +37,7 @@ mod contact;
 mod points;
 mod problem;
 
-use gluey_geom::{Dim, Pose, Space, Twist, Vector};
+use gluey_geom::{Dim, Pose, Twist, Vector};
 
 pub use capsule::Capsule;
 pub use closest::gap;
@@ -90,10 +90,7 @@ impl<const D: usize, S: Shape<D> + ?Sized> Shape<D> for Box<S> {
 }
 
 /// A body moved by a displacement and turned by a rotation vector, given as a twist times a time.
-pub fn displaced<const D: usize>(pose: &Pose<D>, by: &Twist<D>) -> Pose<D>
-where
-    Dim<D>: Space<D>,
-{
+pub fn displaced<const D: usize>(pose: &Pose<D>, by: &Twist<D>) -> Pose<D> {
     let orientation = Dim::<D>::advance(&pose.orientation, &by.spin, 1.0);
     Pose { position: pose.position + by.velocity, orientation }
 }

@@ -1,6 +1,6 @@
 //! Points of contact between two bodies that turn: rows of the Jacobian with moments.
 
-use gluey_geom::{Dim, Space, Twist, Vector};
+use gluey_geom::{Dim, Twist, Vector};
 
 use crate::delassus::{JacobianRow, Response};
 use crate::solver::Factor;
@@ -14,10 +14,7 @@ pub(super) struct PointRow<const D: usize> {
     pub bodies: [usize; 2],
 }
 
-impl<const D: usize> JacobianRow for PointRow<D>
-where
-    Dim<D>: Space<D>,
-{
+impl<const D: usize> JacobianRow for PointRow<D> {
     type Motion = Twist<D>;
     /// For translation and for rotation.
     type Weight = [f64; 2];
@@ -57,10 +54,7 @@ where
 /// Bodies that feel their own drag only, with `c` times their mobilities for translation and rotation.
 pub(super) struct OwnDrag<'a>(pub &'a [[f64; 2]]);
 
-impl<const D: usize> Response<PointRow<D>> for OwnDrag<'_>
-where
-    Dim<D>: Space<D>,
-{
+impl<const D: usize> Response<PointRow<D>> for OwnDrag<'_> {
     const IS_COUPLED: bool = false;
 
     fn respond(&self, motions: &mut [Twist<D>]) {

@@ -6,7 +6,7 @@
 
 mod linearised;
 
-use gluey_geom::{Dim, Matrix, Space, Twist, Vector};
+use gluey_geom::{Matrix, Twist, Vector};
 
 use super::bodies::Bodies;
 use super::closest::{closest, frame};
@@ -62,10 +62,7 @@ struct ContactPoint<const D: usize> {
 }
 
 /// The projection of one step.
-pub(super) struct ShapeProjection<'a, const D: usize, S>
-where
-    Dim<D>: Space<D>,
-{
+pub(super) struct ShapeProjection<'a, const D: usize, S> {
     bodies: &'a Bodies<'a, D, S>,
     params: &'a ContactParams,
     rule: GammaRule,
@@ -85,10 +82,7 @@ impl<const D: usize> ShapePair<D> {
     }
 }
 
-impl<'a, const D: usize, S: Shape<D>> ShapeProjection<'a, D, S>
-where
-    Dim<D>: Space<D>,
-{
+impl<'a, const D: usize, S: Shape<D>> ShapeProjection<'a, D, S> {
     pub(super) fn new(
         bodies: &'a Bodies<'a, D, S>,
         params: &'a ContactParams,

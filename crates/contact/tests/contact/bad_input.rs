@@ -68,7 +68,8 @@ fn particles_are_named() {
         let mismatch = ContactError::LengthMismatch { positions: 3, radii: 2, drifts: 3, twists: 3 };
         assert_eq!(refuse(|i| i.radii.truncate(2)), mismatch);
     }
-    let not_finite = |particle, quantity: &str| ContactError::NotFinite { particle, quantity: quantity.to_owned() };
+    let not_finite =
+        |particle, quantity: &str| ContactError::NotFinite { particle, quantity: quantity.to_owned() };
     assert_eq!(refuse(|i| i.positions[2] = nan), not_finite(2, "position"));
     assert_eq!(refuse(|i| i.twists[1].velocity = nan), not_finite(1, "velocity"));
     assert_eq!(refuse(|i| i.drift[0].x = f64::INFINITY), not_finite(0, "drift"));
@@ -81,7 +82,10 @@ fn messages_count_from_one() {
     let pair = PairKey::new(0, 6);
     for (text, expected) in [
         (message(ContactError::BadRadius { particle: 0, radius: -1.0 }), "particle 1 has the radius -1"),
-        (message(ContactError::NotFinite { particle: 2, quantity: "drift".to_owned() }), "particle 3: its drift"),
+        (
+            message(ContactError::NotFinite { particle: 2, quantity: "drift".to_owned() }),
+            "particle 3: its drift",
+        ),
         (message(ContactError::BadWall { wall: 1 }), "wall 2 needs"),
         (message(ContactError::BadPeriod { direction: 2, period: 0.0 }), "the period 0 along z"),
         (

@@ -3,7 +3,7 @@
 use gluey_contact::{
     ContactLaw, ContactModel, ContactParams, GammaUpdate, PairContact, SolverKind, StepGeometry,
 };
-use gluey_geom::{Dim, Matrix, Particle, Space, Vector};
+use gluey_geom::{Matrix, Particle, Vector};
 use gluey_motion::{BackgroundFlow, Configuration, Hydrodynamics, Integrator, LinearFlow, Scheme};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -23,10 +23,7 @@ fn squeeze_and_release<const D: usize>(
     push: f64,
     step_count: usize,
     params: ContactParams,
-) -> Outcome
-where
-    Dim<D>: Space<D>,
-{
+) -> Outcome {
     let dt = push / step_count as f64;
     let mut random = ChaCha8Rng::seed_from_u64(42);
     let mut jitter = || Vector::<D>::from_fn(|_, _| random.random_range(-0.25..0.25));
@@ -69,10 +66,7 @@ where
     outcome
 }
 
-fn check<const D: usize>(side: usize, push: f64, step_count: usize, miss: f64)
-where
-    Dim<D>: Space<D>,
-{
+fn check<const D: usize>(side: usize, push: f64, step_count: usize, miss: f64) {
     let tuning = |law| ContactParams {
         law,
         exact_gap: true,

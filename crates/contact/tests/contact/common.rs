@@ -4,7 +4,7 @@ use gluey_contact::{
     ContactModel, ContactParams, ContactReport, Film, FilmError, FilmMemory, FilmReport, PairContact,
     StepGeometry, film_reach,
 };
-use gluey_geom::{Dim, Particle, Space, Twist, Vector};
+use gluey_geom::{Particle, Twist, Vector};
 use gluey_motion::{Configuration, Hydrodynamics, Integrator, LinearFlow, PairMobility, Scheme};
 
 pub const RADIUS: f64 = 0.05;
@@ -74,18 +74,12 @@ impl Encounter {
 
 /// A scheme that keeps films open.
 #[derive(Clone)]
-pub struct FilmIntegrator<const D: usize>
-where
-    Dim<D>: Space<D>,
-{
+pub struct FilmIntegrator<const D: usize> {
     pub scheme: Integrator<D>,
     memory: FilmMemory,
 }
 
-impl<const D: usize> FilmIntegrator<D>
-where
-    Dim<D>: Space<D>,
-{
+impl<const D: usize> FilmIntegrator<D> {
     pub fn new(scheme: Scheme) -> Self {
         Self { scheme: Integrator::new(scheme), memory: FilmMemory::default() }
     }

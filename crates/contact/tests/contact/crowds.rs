@@ -3,7 +3,7 @@
 //! method for the displacements, and trajectories beside small steps of a scheme that knows nothing of films.
 
 use gluey_contact::{Film, FilmError, PairKey};
-use gluey_geom::{Dim, Lattice, Particle, Space, Twist, Vector};
+use gluey_geom::{Lattice, Particle, Twist, Vector};
 use gluey_motion::Scheme;
 use nalgebra::{DMatrix, DVector};
 use rand::{Rng, RngExt, SeedableRng};
@@ -17,10 +17,7 @@ const REACH: f64 = 1.0;
 /// Bodies of the radius 1 in a box that is sheared at the rate 1, each with a drag of its own and films
 /// between them: `a (u_i - y_i e_x) = sum_k +- n_k R_k dg_k/dt` with a multiple of the `R` of the scheme.
 #[derive(Clone)]
-struct Crowd<const D: usize>
-where
-    Dim<D>: Space<D>,
-{
+struct Crowd<const D: usize> {
     particles: Vec<Particle<D>>,
     size: f64,
     strain: f64,
@@ -29,10 +26,7 @@ where
     scale: f64,
 }
 
-impl<const D: usize> Crowd<D>
-where
-    Dim<D>: Space<D>,
-{
+impl<const D: usize> Crowd<D> {
     /// At random, then apart until all gaps are at least about 2e-3.
     fn new(seed: u64, count: usize, fraction: f64) -> Self {
         let random = &mut ChaCha8Rng::seed_from_u64(seed);
@@ -164,10 +158,7 @@ where
     }
 }
 
-fn before_shear<const D: usize>(x: &[Vector<D>]) -> Vec<Particle<D>>
-where
-    Dim<D>: Space<D>,
-{
+fn before_shear<const D: usize>(x: &[Vector<D>]) -> Vec<Particle<D>> {
     x.iter().map(|x| Particle::new(*x, 1.0)).collect()
 }
 
@@ -267,10 +258,7 @@ fn apart<const D: usize>(count: usize, films: &[(usize, usize, Vector<D>, f64)])
 }
 
 /// Gaps of the thinnest films after a step with films in balance, over those by Newton's method.
-fn steps_are_those_of_newton<const D: usize>(count: usize, fraction: f64) -> f64
-where
-    Dim<D>: Space<D>,
-{
+fn steps_are_those_of_newton<const D: usize>(count: usize, fraction: f64) -> f64 {
     let mut farthest = 0.0f64;
     let (mut more_films, mut trials) = (0, 0);
     for seed in 0..10 {
@@ -330,10 +318,7 @@ fn gaps_after_a_step_are_those_of_newton_s_method() {
 
 /// Largest relative error of a gap below 0.1, and largest distance of a body, at the strain 0.4 after such
 /// steps.
-fn errors<const D: usize>(fraction: f64, scale: f64, steps: &[f64]) -> Vec<[f64; 2]>
-where
-    Dim<D>: Space<D>,
-{
+fn errors<const D: usize>(fraction: f64, scale: f64, steps: &[f64]) -> Vec<[f64; 2]> {
     let start = Crowd { scale, ..Crowd::<D>::new(3, 12, fraction) };
     let mut exact = start.clone();
     (0..800).for_each(|_| exact.runge_kutta(5e-4));
@@ -382,10 +367,7 @@ fn crowds_whose_films_resist_otherwise_than_taken_for_granted_go_there_as_well()
     }
 }
 
-fn go_on_in_parts<const D: usize>(count: usize, fraction: f64) -> usize
-where
-    Dim<D>: Space<D>,
-{
+fn go_on_in_parts<const D: usize>(count: usize, fraction: f64) -> usize {
     let mut halved = 0;
     for seed in 0..6 {
         let mut crowd = Crowd::<D>::new(seed, count, fraction);

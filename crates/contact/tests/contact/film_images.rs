@@ -1,7 +1,7 @@
 //! Films to images that slide, as in simple shear for ever (Lees and Edwards 1972).
 
 use gluey_contact::{Film, PairKey};
-use gluey_geom::{Dim, Lattice, Particle, Space, Twist, Vector};
+use gluey_geom::{Lattice, Particle, Twist, Vector};
 use gluey_motion::{LinearFlow, Scheme};
 
 use crate::common::FilmIntegrator;
@@ -11,10 +11,7 @@ const LENGTH: f64 = 9.0;
 
 /// A pair in a shear whose gap follows `(1 + 1/gap) d gap / dt = ` what it would be without a film. The
 /// second particle is followed as the one that is so many rows of boxes further down.
-struct Pair<const D: usize>
-where
-    Dim<D>: Space<D>,
-{
+struct Pair<const D: usize> {
     particles: [Particle<D>; 2],
     rows: i32,
     lattice: Lattice<D>,
@@ -24,10 +21,7 @@ where
     integrator: FilmIntegrator<D>,
 }
 
-impl<const D: usize> Pair<D>
-where
-    Dim<D>: Space<D>,
-{
+impl<const D: usize> Pair<D> {
     fn new(scheme: Scheme, rows: i32) -> Self {
         let lattice = Lattice::new(std::array::from_fn(|d| Some([LENGTH, HEIGHT, LENGTH][d]))).tilted(1.3);
         let mut pair = Self {
@@ -105,10 +99,7 @@ fn difference(one: &[f64], other: &[f64]) -> f64 {
     one.iter().zip(other).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
 }
 
-fn images_are_as_good_as_particles<const D: usize>()
-where
-    Dim<D>: Space<D>,
-{
+fn images_are_as_good_as_particles<const D: usize>() {
     let known_late = |scheme, rows| Pair::<D> { widest: 0.8, ..Pair::new(scheme, rows) }.gaps(0.05);
     for scheme in [Scheme::Euler, Scheme::AdamsBashforth2] {
         let [direct, late] = [Pair::<D>::new(scheme, 0).gaps(0.05), known_late(scheme, 0)];
@@ -130,18 +121,12 @@ fn an_encounter_across_a_sliding_border_is_that_without_one() {
 }
 
 /// Difference of the gaps at equal times from those of half the step.
-fn error<const D: usize>(dt: f64) -> f64
-where
-    Dim<D>: Space<D>,
-{
+fn error<const D: usize>(dt: f64) -> f64 {
     let [coarse, fine] = [dt, 0.5 * dt].map(|dt| Pair::<D>::new(Scheme::AdamsBashforth2, 1).gaps(dt));
     difference(&coarse, &fine.into_iter().step_by(2).collect::<Vec<_>>())
 }
 
-fn is_of_second_order<const D: usize>()
-where
-    Dim<D>: Space<D>,
-{
+fn is_of_second_order<const D: usize>() {
     let errors = [0.04, 0.02, 0.01].map(error::<D>);
     println!("{D}D: {errors:?}");
     for pair in errors.windows(2) {

@@ -1,7 +1,7 @@
 //! Films stay open, and at the order of the scheme.
 
 use gluey_contact::{Film, FilmError, PairKey};
-use gluey_geom::{Dim, Particle, Space, Twist, Vector};
+use gluey_geom::{Particle, Twist, Vector};
 use gluey_motion::{Configuration, Hydrodynamics, LinearFlow, PairMobility, Scheme};
 
 use crate::common::FilmIntegrator;
@@ -114,10 +114,7 @@ fn a_closed_film_stays_closed_over_a_restart() {
 }
 
 /// A film of two of these particles, or of one and the wall `x = 0`.
-fn film<const D: usize>(particles: &[Particle<D>], first: usize, second: Option<usize>) -> Film<D>
-where
-    Dim<D>: Space<D>,
-{
+fn film<const D: usize>(particles: &[Particle<D>], first: usize, second: Option<usize>) -> Film<D> {
     let x = particles[first].pose.position;
     let mut to_wall = Vector::<D>::zeros();
     to_wall[0] = -x[0];
@@ -131,10 +128,7 @@ where
 }
 
 /// Particles that are driven together against a wall, in steps in which each would move by its diameter.
-fn nothing_closes<const D: usize>(scheme: Scheme)
-where
-    Dim<D>: Space<D>,
-{
+fn nothing_closes<const D: usize>(scheme: Scheme) {
     let place = |k: usize| {
         Vector::<D>::from_fn(|d, _| {
             1.2 + 2.3 * ((k / 3usize.pow(d as u32)) % 3) as f64 + 0.1 * (k * (d + 3) % 7) as f64 / 7.0

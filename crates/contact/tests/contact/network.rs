@@ -4,7 +4,7 @@ use gluey_contact::{
     Contact, ContactError, ContactLaw, ContactModel, ContactNetwork, ContactParams, Domain, PairContact,
     PairKey, StepGeometry, Wall,
 };
-use gluey_geom::{Dim, Matrix, Space, Twist, Vector};
+use gluey_geom::{Matrix, Twist, Vector};
 
 fn contact(pair: PairKey, lambda: f64) -> Contact {
     Contact { pair, lambda, gamma: -0.5 * lambda, gap: 0.0 }
@@ -188,10 +188,7 @@ fn two_discs_and_walls() {
 
 /// A heap that is pressed together across periodic, tilted borders: forces are changes of velocity times
 /// radii.
-fn moves_as_forces_say<const D: usize>()
-where
-    Dim<D>: Space<D>,
-{
+fn moves_as_forces_say<const D: usize>() {
     let mut domain = Domain::periodic(&Vector::<D>::repeat(4.0));
     domain.set_sliding(0.7, 0.0);
     let number = |k: usize| (0.5 + k as f64 * 0.754_877_666).fract();
@@ -241,10 +238,7 @@ fn rattlers_are_peeled_off() {
     assert_eq!(network.clusters().size_distribution(), [(count + 2, 1), (1, 1)]);
 }
 
-fn refuses<const D: usize>(pair: PairKey) -> ContactError
-where
-    Dim<D>: Space<D>,
-{
+fn refuses<const D: usize>(pair: PairKey) -> ContactError {
     let domain = Domain::<D>::default();
     ContactNetwork::new(&[contact(pair, 1.0)], &[Vector::zeros()], &[1.0], &domain).expect_err("nobody there")
 }

@@ -9,7 +9,7 @@
 use gluey_contact::{
     ContactLaw, ContactModel, ContactParams, Domain, GammaUpdate, PairContact, PairKey, StepGeometry, Wall,
 };
-use gluey_geom::{Dim, Particle, Space, Twist, Vector};
+use gluey_geom::{Particle, Twist, Vector};
 use gluey_motion::{Integrator, Scheme};
 use gluey_testkit::convergence_order;
 
@@ -26,10 +26,7 @@ struct Fall {
     last_gap: f64,
 }
 
-fn fall<const D: usize>(params: ContactParams, scheme: Scheme, step_count: usize) -> Fall
-where
-    Dim<D>: Space<D>,
-{
+fn fall<const D: usize>(params: ContactParams, scheme: Scheme, step_count: usize) -> Fall {
     let normal = Vector::<D>::from_fn(|d, _| 1.0 - 0.4 * d as f64).normalize();
     let wall = Wall::new(&Vector::repeat(0.1), &normal);
     let start = Vector::repeat(0.1) + normal * (RADIUS + GAP);
@@ -68,10 +65,7 @@ where
 }
 
 /// Errors of the beginning, the end and the last gap; the order of the last.
-fn errors<const D: usize>(params: &ContactParams, scheme: Scheme, exact: &Fall) -> (Vec<[f64; 3]>, f64)
-where
-    Dim<D>: Space<D>,
-{
+fn errors<const D: usize>(params: &ContactParams, scheme: Scheme, exact: &Fall) -> (Vec<[f64; 3]>, f64) {
     let table: Vec<[f64; 3]> = STEP_COUNTS
         .iter()
         .map(|&count| {
@@ -93,10 +87,7 @@ where
     (table, order)
 }
 
-fn check<const D: usize>()
-where
-    Dim<D>: Space<D>,
-{
+fn check<const D: usize>() {
     let begin = GAP.asin();
     let smooth = Fall { begin, end: std::f64::consts::PI - begin, last_gap: GAP - END.sin() };
     let floor: f64 = 0.4;

@@ -8,7 +8,7 @@ use gluey_contact::{
     ContactLaw, ContactModel, ContactParams, ContactState, Mobility, PairContact, PairKey, PairState,
     SolverKind, StepGeometry, StokesDrag,
 };
-use gluey_geom::{Dim, Space, Twist, Vector};
+use gluey_geom::{Twist, Vector};
 use rand::{RngExt, SeedableRng, seq::SliceRandom};
 use rand_chacha::ChaCha8Rng;
 
@@ -30,10 +30,7 @@ struct Packing<const D: usize> {
     glued: Vec<PairKey>,
 }
 
-impl<const D: usize> Packing<D>
-where
-    Dim<D>: Space<D>,
-{
+impl<const D: usize> Packing<D> {
     /// A jittered square or cubic lattice of `side^D` particles; without jitter all neighbours touch exactly,
     /// and there are more contacts than degrees of freedom can tell apart.
     fn new(side: usize, jitter: f64, seed: u64) -> Self {
@@ -130,10 +127,7 @@ fn params(solver: SolverKind) -> ContactParams {
 
 /// Feasibility of all pairs (also those the search left out), stationarity, sign and complementarity: these
 /// characterise the solution of a strictly convex problem.
-fn assert_optimal<const D: usize>(packing: &Packing<D>, velocities: &[Vector<D>], contact: &PairContact<D>)
-where
-    Dim<D>: Space<D>,
-{
+fn assert_optimal<const D: usize>(packing: &Packing<D>, velocities: &[Vector<D>], contact: &PairContact<D>) {
     let mut balance: Vec<Vector<D>> =
         (0..velocities.len()).map(|i| (velocities[i] - packing.predicted[i]) * packing.radii[i]).collect();
     for (pair, normal, known, glued) in packing.rows() {
@@ -155,10 +149,7 @@ where
     }
 }
 
-fn check_optimality<const D: usize>(side: usize)
-where
-    Dim<D>: Space<D>,
-{
+fn check_optimality<const D: usize>(side: usize) {
     for seed in 0..20 {
         // Every fourth packing touches exactly: its multipliers are not unique, its velocities are.
         let mut packing = Packing::<D>::new(side, if seed % 4 == 0 { 0.0 } else { 0.01 }, seed);
@@ -186,10 +177,7 @@ fn velocities_are_optimal() {
 
 /// More contacts than degrees of freedom, squeezed: which of them carry forces is what takes gradient methods
 /// so long.
-fn check_jammed<const D: usize>(side: usize)
-where
-    Dim<D>: Space<D>,
-{
+fn check_jammed<const D: usize>(side: usize) {
     let mut packing = Packing::<D>::new(side, 0.0025, 17);
     packing.make_triangular();
     packing.glued.clear();
@@ -215,10 +203,7 @@ fn jammed_clusters_are_solved_for() {
 
 /// The same problem for an interior-point method: minimise 1/2 v.M v - (M u*).v subject to all pairs'
 /// constraints.
-fn interior_point<const D: usize>(packing: &Packing<D>) -> Vec<f64>
-where
-    Dim<D>: Space<D>,
-{
+fn interior_point<const D: usize>(packing: &Packing<D>) -> Vec<f64> {
     // Pairs that are far apart cannot bind.
     let mut rows: Vec<_> = packing.rows().into_iter().filter(|row| row.2 < 0.8).collect();
     rows.sort_by_key(|row| !row.3);
@@ -267,10 +252,7 @@ where
 }
 
 /// Velocities agree to 1e-8 of the largest.
-fn check_interior_point<const D: usize>(packing: &Packing<D>, solver: SolverKind) -> usize
-where
-    Dim<D>: Space<D>,
-{
+fn check_interior_point<const D: usize>(packing: &Packing<D>, solver: SolverKind) -> usize {
     let (velocities, contact) = packing.solve(params(solver));
     assert_optimal(packing, &velocities, &contact);
     let other = interior_point(packing);
@@ -287,10 +269,7 @@ where
 /// 100 packings of 2 to 12 (in 3D 2 to 5) particles a side; small ones now and then with triangular layers,
 /// which have more contacts than degrees of freedom, so that contacts depend on each other linearly; two of
 /// three have pairs that must stay closed.
-fn check_packings<const D: usize>(largest_side: u64)
-where
-    Dim<D>: Space<D>,
-{
+fn check_packings<const D: usize>(largest_side: u64) {
     let (mut fewest, mut most) = (usize::MAX, 0);
     for seed in 0..100 {
         let side = 2 + seed % (largest_side - 1);
@@ -317,10 +296,7 @@ fn an_interior_point_solver_agrees_on_two_hundred_packings() {
 }
 
 /// One pair of different sizes: `lambda = -q / (c (1/a_i + 1/a_j))`, the paper's eq. 29 in closed form.
-fn check_closed_form<const D: usize>()
-where
-    Dim<D>: Space<D>,
-{
+fn check_closed_form<const D: usize>() {
     let normal = Vector::<D>::from_fn(|d, _| 0.8 - d as f64).normalize();
     let (radii, first_gap) = ([0.3, 0.7], 0.05);
     let positions = [Vector::<D>::repeat(0.2), Vector::<D>::repeat(0.2) + normal * (1.0 + first_gap)];
@@ -353,10 +329,7 @@ fn one_pair_has_a_closed_form() {
     check_closed_form::<3>();
 }
 
-fn check_numbering<const D: usize>(side: usize, law: ContactLaw)
-where
-    Dim<D>: Space<D>,
-{
+fn check_numbering<const D: usize>(side: usize, law: ContactLaw) {
     let packing = Packing::<D>::new(side, 0.01, 7);
     let mut order: Vec<usize> = (0..packing.positions.len()).collect();
     order.shuffle(&mut ChaCha8Rng::seed_from_u64(3));
@@ -379,10 +352,7 @@ fn numbering_changes_no_bit() {
     }
 }
 
-fn check_exact_gaps<const D: usize>(side: usize)
-where
-    Dim<D>: Space<D>,
-{
+fn check_exact_gaps<const D: usize>(side: usize) {
     for law in [ContactLaw::Gluey, ContactLaw::Inelastic, ContactLaw::VelocityCorrection] {
         for solver in SOLVERS {
             let packing = Packing::<D>::new(side, 0.01, 11);

@@ -9,7 +9,7 @@
 use gluey_contact::{
     ContactLaw, ContactParams, GammaUpdate, Mobility, PairContact, StepGeometry, StokesDrag,
 };
-use gluey_geom::{Dim, Space, Twist, Vector};
+use gluey_geom::{Twist, Vector};
 
 const SPEED: f64 = 1.0;
 const RADIUS: f64 = 0.5;
@@ -18,10 +18,7 @@ const TURN: f64 = 1.0;
 const END: f64 = 2.0;
 
 /// Gap at `END` by explicit Euler.
-fn end_gap<const D: usize, M: Mobility<D>>(params: ContactParams, mobility: M, step_count: usize) -> f64
-where
-    Dim<D>: Space<D>,
-{
+fn end_gap<const D: usize, M: Mobility<D>>(params: ContactParams, mobility: M, step_count: usize) -> f64 {
     let mut contact = PairContact::with_mobility(params, mobility);
     // Obliquely, so that no coordinate is special.
     let axis = Vector::<D>::from_fn(|d, _| 1.0 - 0.3 * d as f64).normalize();
@@ -51,10 +48,7 @@ fn tuning(gamma_update: GammaUpdate) -> ContactParams {
     ContactParams { gamma_update, ..Default::default() }
 }
 
-fn check<const D: usize>()
-where
-    Dim<D>: Space<D>,
-{
+fn check<const D: usize>() {
     let begin = FIRST_GAP / (2.0 * SPEED);
     let exact = 2.0 * SPEED * (END - 2.0 * TURN + begin);
     for step_count in [52, 104, 208] {

@@ -9,7 +9,7 @@ use gluey_contact::{
     ContactLaw, ContactModel, ContactParams, Domain, GammaUpdate, Mobility, PairContact, SolverKind,
     StepGeometry, StokesDrag, Wall, WithFixed,
 };
-use gluey_geom::{Dim, Particle, Space, Twist, Vector};
+use gluey_geom::{Particle, Twist, Vector};
 use gluey_motion::{Integrator, Scheme};
 
 /// The sum of Fowler, Noll and Vo (FNV-1a) over the bits of numbers.
@@ -52,10 +52,7 @@ impl<const D: usize> Mobility<D> for Coupled {
 /// Discs or spheres on a lattice out of order, periodic along x, between a floor and a ceiling, squeezed and
 /// sheared there and back. Returns the most contacts of a step, and the fingerprint of forces, memories and
 /// positions.
-fn run<const D: usize, M: Mobility<D>>(params: ContactParams, mobility: M, side: usize) -> (usize, u64)
-where
-    Dim<D>: Space<D>,
-{
+fn run<const D: usize, M: Mobility<D>>(params: ContactParams, mobility: M, side: usize) -> (usize, u64) {
     let spacing = 2.05;
     let length = spacing * side as f64;
     let index = |i: usize, d: usize| i / side.pow(d as u32) % side;

@@ -4,7 +4,7 @@ use gluey_contact::{
     Contact, ContactLaw, ContactModel, ContactParams, ContactState, Domain, GammaUpdate, PairContact,
     PairKey, PairState, SolverKind, StepGeometry,
 };
-use gluey_geom::{Dim, Lattice, Particle, Space, Twist, Vector};
+use gluey_geom::{Lattice, Particle, Twist, Vector};
 use gluey_motion::{BackgroundFlow, Configuration, Hydrodynamics, Integrator, LinearFlow, Scheme};
 use gluey_testkit::cpu_seconds;
 use gluey_testkit::packing::Packing;
@@ -24,10 +24,7 @@ fn tuning(law: ContactLaw) -> ContactParams {
 }
 
 /// Discs or spheres that drift with the shear `u = rate y` as if each were alone, but for their contacts.
-struct Suspension<const D: usize>
-where
-    Dim<D>: Space<D>,
-{
+struct Suspension<const D: usize> {
     particles: Vec<Particle<D>>,
     radii: Vec<f64>,
     /// Velocities of the last step.
@@ -40,10 +37,7 @@ where
     integrator: Integrator<D>,
 }
 
-impl<const D: usize> Suspension<D>
-where
-    Dim<D>: Space<D>,
-{
+impl<const D: usize> Suspension<D> {
     fn new(positions: &[Vector<D>], lengths: &Vector<D>, tilt: f64, params: ContactParams) -> Self {
         let mut domain = Domain::periodic(lengths);
         domain.set_sliding(tilt, 0.0);
@@ -135,10 +129,7 @@ fn packing<const D: usize>() -> Packing<D> {
     if D == 2 { Packing::fluid(60, 0.6, 3) } else { Packing::fluid(108, 0.45, 3) }
 }
 
-fn tilts_that_differ_by_a_period_are_the_same<const D: usize>()
-where
-    Dim<D>: Space<D>,
-{
+fn tilts_that_differ_by_a_period_are_the_same<const D: usize>() {
     let packing = packing::<D>();
     let run = |turns: f64, law| {
         let mut suspension = Suspension::of(&packing, (0.3 + turns) * packing.side, law);
@@ -166,10 +157,7 @@ fn tilts_by_a_period_change_nothing() {
     tilts_that_differ_by_a_period_are_the_same::<3>();
 }
 
-fn copies_move_alike<const D: usize>(axis: usize, params: &ContactParams)
-where
-    Dim<D>: Space<D>,
-{
+fn copies_move_alike<const D: usize>(axis: usize, params: &ContactParams) {
     let packing = packing::<D>();
     let side = Vector::repeat(packing.side);
     let mut one = Suspension::new(&packing.positions, &side, 0.3 * packing.side, params.clone());
@@ -211,10 +199,7 @@ fn a_box_and_two_copies_of_it_move_alike() {
     }
 }
 
-fn translations_change_nothing<const D: usize>()
-where
-    Dim<D>: Space<D>,
-{
+fn translations_change_nothing<const D: usize>() {
     let packing = packing::<D>();
     let mut here = Suspension::of(&packing, 0.3 * packing.side, ContactLaw::Gluey);
     let along = Vector::<D>::from_fn(|d, _| packing.side * [0.4, -1.7, 0.9][d]);
@@ -254,10 +239,7 @@ fn threads_change_no_bit() {
 }
 
 /// Shears for so many steps, by 0.01 each.
-fn sheared_for_long<const D: usize>(packing: &Packing<D>, law: ContactLaw, step_count: usize)
-where
-    Dim<D>: Space<D>,
-{
+fn sheared_for_long<const D: usize>(packing: &Packing<D>, law: ContactLaw, step_count: usize) {
     let dt = 0.01;
     // One thread, whose CPU time is that of the step.
     let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().expect("a thread");
@@ -307,12 +289,9 @@ fn spheres_never_overlap_however_long_they_are_sheared() {
 }
 
 /// A pair that is glued turns in the shear, and remembers, while its image passes by many boxes.
-fn a_glued_pair_turns_across_the_border<const D: usize>()
-where
-    Dim<D>: Space<D>,
-{
+fn a_glued_pair_turns_across_the_border<const D: usize>() {
     let (side, dt) = (6.0, 0.01);
-    let lengths = Vector::repeat(side);
+    let lengths = Vector::<D>::repeat(side);
     // The second is written one row of boxes too low.
     let tilt = 0.4 * side;
     let image = [0, 1, 0];

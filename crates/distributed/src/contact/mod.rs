@@ -10,7 +10,7 @@ use gluey_contact::{
     BodyStep, Contact, ContactError, ContactLaw, ContactModel, ContactParams, ContactReport, ContactState,
     Domain, MemoryError, PairContact, StepGeometry, WithFixed,
 };
-use gluey_geom::{Dim, Space, Twist};
+use gluey_geom::{Dim, Twist};
 use gluey_parallel::{Communicator, Ranks};
 
 use partners::{Sharers, all_of};
@@ -38,10 +38,7 @@ pub struct ContactLoad {
     pub shared_pair_count: usize,
 }
 
-impl<'a, const D: usize> SharedContact<'a, D>
-where
-    Dim<D>: Space<D>,
-{
+impl<'a, const D: usize> SharedContact<'a, D> {
     /// What `contact` does alone, by ranks.
     pub fn new(contact: PairContact<D, WithFixed>, ranks: &'a Ranks) -> Self {
         let (contact, load) = (PartContact::new(contact), ContactLoad::default());
@@ -130,10 +127,7 @@ where
 
 /// Replaces twists by those of rank zero: what was computed beside it by another machine may differ in the
 /// last bit.
-fn share_twists<const D: usize>(ranks: &Ranks, twists: &mut [Twist<D>])
-where
-    Dim<D>: Space<D>,
-{
+fn share_twists<const D: usize>(ranks: &Ranks, twists: &mut [Twist<D>]) {
     let of_twist = |twist: &Twist<D>| [twist.velocity.as_slice(), Dim::<D>::spin_slice(&twist.spin)].concat();
     let mut numbers: Vec<f64> = twists.iter().flat_map(of_twist).collect();
     ranks.share(&mut numbers);
@@ -143,10 +137,7 @@ where
     }
 }
 
-impl<const D: usize> ContactModel<D> for SharedContact<'_, D>
-where
-    Dim<D>: Space<D>,
-{
+impl<const D: usize> ContactModel<D> for SharedContact<'_, D> {
     fn correct_bodies(
         &mut self,
         step: &BodyStep<'_, D>,

@@ -2,7 +2,6 @@
 
 use std::rc::Rc;
 
-use gluey_geom::{Dim, Space};
 use gluey_levelset::Ball;
 use gluey_motion::{Configuration, Fields, Film, FlowStatistics, Hydrodynamics, Prediction, ResumeError};
 use gluey_parallel::Ranks;
@@ -12,10 +11,7 @@ use crate::flow::LocalFlow;
 use crate::memory::FlowMemory;
 
 /// The flow of a suspension as a model of how its particles move. All ranks make the same predictions.
-pub struct SharedHydrodynamics<'a, const D: usize>
-where
-    Dim<D>: Space<D>,
-{
+pub struct SharedHydrodynamics<'a, const D: usize> {
     suspension: &'a SharedSuspension<D>,
     ranks: &'a Ranks,
     /// Of the last prediction, if it succeeded.
@@ -25,19 +21,13 @@ where
 }
 
 /// A flow in the cells of a rank, around these bodies, and the factor of the shear that drives it.
-struct PredictedFlow<const D: usize>
-where
-    Dim<D>: Space<D>,
-{
+struct PredictedFlow<const D: usize> {
     flow: LocalFlow<D>,
     balls: Vec<Ball<D>>,
     shear_factor: f64,
 }
 
-impl<'a, const D: usize> SharedHydrodynamics<'a, D>
-where
-    Dim<D>: Space<D>,
-{
+impl<'a, const D: usize> SharedHydrodynamics<'a, D> {
     /// By the flow of `suspension`.
     pub fn new(suspension: &'a SharedSuspension<D>, ranks: &'a Ranks) -> Self {
         Self { suspension, ranks, last: None, memory: Rc::default() }
@@ -50,10 +40,7 @@ where
     }
 }
 
-impl<const D: usize> Hydrodynamics<D> for SharedHydrodynamics<'_, D>
-where
-    Dim<D>: Space<D>,
-{
+impl<const D: usize> Hydrodynamics<D> for SharedHydrodynamics<'_, D> {
     type Error = SuspensionError;
 
     fn predict(&mut self, configuration: &Configuration<'_, D>) -> Result<Prediction<D>, SuspensionError> {

@@ -1,7 +1,7 @@
 //! The flow around particles that move, on ranks.
 
 use gluey_fem::{ImplicitTree, MeshError};
-use gluey_geom::{Dim, Space, Vector};
+use gluey_geom::Vector;
 use gluey_levelset::BallTree;
 use gluey_motion::{Configuration, Prediction};
 use gluey_parallel::{Communicator, Ranks};
@@ -14,10 +14,7 @@ use crate::surface::{SharedTree, SurfaceBodies};
 
 /// A suspension whose flow ranks share.
 #[derive(Clone, Debug)]
-pub struct SharedSuspension<const D: usize>
-where
-    Dim<D>: Space<D>,
-{
+pub struct SharedSuspension<const D: usize> {
     /// Fluid and tolerance.
     pub flow: BoxFlow,
     /// The particles, and what drives them.
@@ -38,10 +35,7 @@ pub enum SuspensionError {
     NotDriven(#[from] NotDriven),
 }
 
-impl<const D: usize> SharedSuspension<D>
-where
-    Dim<D>: Space<D>,
-{
+impl<const D: usize> SharedSuspension<D> {
     /// The flow of a configuration, in a box without walls relative to the undisturbed one. All ranks call
     /// this with the same numbers.
     ///

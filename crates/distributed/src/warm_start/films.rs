@@ -1,6 +1,5 @@
 //! What is kept of films, on its way from the rank that had a film to the one that has it now.
 
-use gluey_geom::{Dim, Space};
 use gluey_levelset::Ball;
 use gluey_parallel::{Communicator, route};
 use gluey_stokes::Partition;
@@ -39,10 +38,7 @@ impl KeptFilm {
 }
 
 /// Films of the last flow whose bodies are places in `ids`.
-pub fn kept<const D: usize>(ids: &[u32], films: &[f64]) -> Vec<KeptFilm>
-where
-    Dim<D>: Space<D>,
-{
+pub fn kept<const D: usize>(ids: &[u32], films: &[f64]) -> Vec<KeptFilm> {
     let id = |place: f64| if place < 0.0 { place } else { f64::from(ids[place as usize]) };
     let film = |numbers: &[f64]| {
         let mut film = [0; 3 + MOST_NUMBERS];
@@ -55,10 +51,7 @@ where
 }
 
 /// The other way round, without films of bodies that are not among `ids`, which ascend.
-pub fn near<'f, const D: usize>(ids: &[u32], films: impl Iterator<Item = &'f KeptFilm>) -> Vec<f64>
-where
-    Dim<D>: Space<D>,
-{
+pub fn near<'f, const D: usize>(ids: &[u32], films: impl Iterator<Item = &'f KeptFilm>) -> Vec<f64> {
     let place = |id: u32| ids.binary_search(&id).ok().map(|place| place as f64);
     let mut numbers = Vec::new();
     for film in films {

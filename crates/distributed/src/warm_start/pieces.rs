@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use gluey_fem::{Cell, Cuts, ImplicitTree, MeshError, NodeMap, TreeMesh};
-use gluey_geom::{Dim, Space};
+use gluey_geom::Dim;
 use gluey_parallel::{Communicator, Ranks};
 use gluey_stokes::Suspension;
 use serde::{Deserialize, Serialize};
@@ -64,10 +64,7 @@ impl SavedPiece {
     }
 }
 
-impl<const D: usize> KeptFlows<D>
-where
-    Dim<D>: Space<D>,
-{
+impl<const D: usize> KeptFlows<D> {
     /// The pieces of this rank.
     pub fn saved(&self) -> Vec<SavedPiece> {
         self.pieces.iter().map(|piece| self.saved_piece(piece)).collect()

@@ -1,7 +1,7 @@
 //! The last flows at the nodes of another mesh.
 
 use gluey_fem::TreeMesh;
-use gluey_geom::{Dim, Space};
+use gluey_geom::Dim;
 use gluey_levelset::Ball;
 use gluey_parallel::Communicator;
 use gluey_stokes::{Discretisation, NodalFields, Partition};
@@ -16,10 +16,7 @@ pub struct TransferredFlows {
     pub small: GlobalState,
 }
 
-impl<const D: usize> KeptFlows<D>
-where
-    Dim<D>: Space<D>,
-{
+impl<const D: usize> KeptFlows<D> {
     /// After a flow of which `last` is kept, for the bodies near the part, and the flows before it on its
     /// cells. All ranks call this.
     pub fn new(
@@ -68,10 +65,7 @@ impl TransferredFlows {
         &mut self,
         partition: &Partition<D>,
         balls: &[Ball<D>],
-    ) -> [Option<NodalFields>; MOST]
-    where
-        Dim<D>: Space<D>,
-    {
+    ) -> [Option<NodalFields>; MOST] {
         let films = films::exchanged(partition, balls, &mut self.small.films);
         let (ids, n) = (&partition.bodies.ids, Dim::<D>::RIGID);
         let fields = |age: usize| {
@@ -87,10 +81,7 @@ impl TransferredFlows {
 }
 
 /// The motions of all bodies, of which each rank has its own.
-fn motions_of_all<const D: usize>(partition: &Partition<D>, motions: &[f64]) -> Vec<f64>
-where
-    Dim<D>: Space<D>,
-{
+fn motions_of_all<const D: usize>(partition: &Partition<D>, motions: &[f64]) -> Vec<f64> {
     let n = Dim::<D>::RIGID;
     let mut own = vec![0.0; motions.len()];
     partition.own_bodies().for_each(|body| own[body * n..][..n].copy_from_slice(&motions[body * n..][..n]));

@@ -5,7 +5,7 @@ use std::sync::atomic::Ordering;
 
 use gluey_contact::{ContactParams, Domain, PairContact, StepGeometry, WithFixed};
 use gluey_distributed::{BoxFlow, SharedContact, SharedSuspension, SuspensionError};
-use gluey_geom::{Dim, Space, Twist, Vector, Wrench};
+use gluey_geom::{Twist, Vector, Wrench};
 use gluey_motion::Configuration;
 use gluey_parallel::Ranks;
 use gluey_stokes::{Lubrication, Refinement, StokesError, Suspension};
@@ -51,10 +51,7 @@ fn fail_in_turn(
 }
 
 /// Two particles, between walls or in a box that is sheared for ever.
-fn suspension<const D: usize>(lubrication: Lubrication, is_sheared: bool) -> Suspension<D>
-where
-    Dim<D>: Space<D>,
-{
+fn suspension<const D: usize>(lubrication: Lubrication, is_sheared: bool) -> Suspension<D> {
     let refinement = Refinement { coarsest: 3, surface: 4, band: 2.0 };
     Suspension {
         periods: std::array::from_fn(|d| (is_sheared || d == 0).then_some(1.0)),
@@ -68,10 +65,7 @@ fn failure<const D: usize>(
     suspension: &Suspension<D>,
     ranks: &Ranks,
     heights: [f64; 2],
-) -> Option<SuspensionError>
-where
-    Dim<D>: Space<D>,
-{
+) -> Option<SuspensionError> {
     let place = |k: usize| Vector::from_fn(|d, _| [[0.3, 0.7][k], heights[k], 0.5][d]);
     let particles = suspension.particles(&[place(0), place(1)]);
     let flow = BoxFlow { viscosity: 1.0, tolerance: 1e-6, max_iterations: 500 };
@@ -79,10 +73,7 @@ where
     shared.solve(ranks, &Configuration::at(0.0, &particles)).err()
 }
 
-fn a_flow_fails_as_one<const D: usize>(what: &'static str, fewest: usize, of: Suspension<D>)
-where
-    Dim<D>: Space<D>,
-{
+fn a_flow_fails_as_one<const D: usize>(what: &'static str, fewest: usize, of: Suspension<D>) {
     fail_in_turn(what, fewest, move |ranks| failure(&of, ranks, [0.55, 0.45]).map(|error| error.to_string()));
 }
 

@@ -2,7 +2,7 @@
 
 use gluey_distributed::{BoxFlow, LocalFlow, equal_cuts, weighted_cuts};
 use gluey_fem::{Cell, Cuts, ImplicitTree};
-use gluey_geom::{Aabb, Dim, Space, Vector};
+use gluey_geom::{Aabb, Vector};
 use gluey_parallel::Ranks;
 use gluey_stokes::StokesError;
 
@@ -37,10 +37,7 @@ impl Example {
         }
     }
 
-    fn solve<const D: usize>(self, ranks: &Ranks) -> LocalFlow<D>
-    where
-        Dim<D>: Space<D>,
-    {
+    fn solve<const D: usize>(self, ranks: &Ranks) -> LocalFlow<D> {
         let wants = self.wants::<D>();
         let mut tree = ImplicitTree::new(Aabb::unit(), [1; D], self.periodic(), self.level, &wants).unwrap();
         let cuts = equal_cuts(&tree, ranks);
@@ -57,19 +54,13 @@ fn walls<const D: usize>(x: &Vector<D>) -> Vector<D> {
 }
 
 /// Velocities and pressures of all ranks, one after the other.
-fn joined<const D: usize>(parts: &[LocalFlow<D>]) -> (Vec<Vector<D>>, Vec<f64>)
-where
-    Dim<D>: Space<D>,
-{
+fn joined<const D: usize>(parts: &[LocalFlow<D>]) -> (Vec<Vector<D>>, Vec<f64>) {
     let velocity = parts.iter().flat_map(LocalFlow::velocity).collect();
     (velocity, parts.iter().flat_map(|part| part.pressure().iter().copied()).collect())
 }
 
 /// Velocities and pressures are those of one rank but for these limits.
-fn ranks_find_the_flow_of_one<const D: usize>(example: Example, limits: [f64; 2])
-where
-    Dim<D>: Space<D>,
-{
+fn ranks_find_the_flow_of_one<const D: usize>(example: Example, limits: [f64; 2]) {
     let alone = example.solve::<D>(&Ranks::alone());
     assert!(alone.flow.residual < 1e-11);
     for size in [2, 3, 4, 8] {

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use gluey_distributed::{BoxFlow, SharedHydrodynamics, SharedSuspension, SuspensionError};
 use gluey_fem::element::{multi_index, value};
-use gluey_geom::{Dim, Particle, Space, Vector};
+use gluey_geom::{Particle, Vector};
 use gluey_levelset::{Ball, BallTree};
 use gluey_motion::{Configuration, Fields, Hydrodynamics};
 use gluey_stokes::{
@@ -17,10 +17,7 @@ use crate::support::{self, on_ranks};
 const BODIES: [([f64; 3], f64); 3] =
     [([0.4, 0.35, 0.52], 0.14), ([0.5, 0.76, 0.7], 0.1), ([0.98, 0.6, 0.4], 0.16)];
 
-fn suspension<const D: usize>(lubrication: Lubrication) -> SharedSuspension<D>
-where
-    Dim<D>: Space<D>,
-{
+fn suspension<const D: usize>(lubrication: Lubrication) -> SharedSuspension<D> {
     let surface = if D == 2 { 5 } else { 4 };
     let flow = BoxFlow { viscosity: 1.7, tolerance: 1e-11, max_iterations: 200 };
     let refinement = Refinement { coarsest: surface - 2, surface, band: 2.0 };
@@ -28,27 +25,18 @@ where
     SharedSuspension { flow, suspension: support::suspension(refinement, lubrication, radii) }
 }
 
-fn particles<const D: usize>() -> Vec<Particle<D>>
-where
-    Dim<D>: Space<D>,
-{
+fn particles<const D: usize>() -> Vec<Particle<D>> {
     BODIES.iter().map(|(x, radius)| Particle::new(Vector::from_fn(|d, _| x[d]), *radius)).collect()
 }
 
-fn balls<const D: usize>(suspension: &SharedSuspension<D>) -> Vec<Ball<D>>
-where
-    Dim<D>: Space<D>,
-{
+fn balls<const D: usize>(suspension: &SharedSuspension<D>) -> Vec<Ball<D>> {
     let ball = |(x, radius): &([f64; 3], f64)| {
         Ball::periodic(Vector::from_fn(|d, _| x[d]), *radius, suspension.suspension.periods)
     };
     BODIES.iter().map(ball).collect()
 }
 
-fn serial<const D: usize>(suspension: &SharedSuspension<D>) -> Flow<D>
-where
-    Dim<D>: Space<D>,
-{
+fn serial<const D: usize>(suspension: &SharedSuspension<D>) -> Flow<D> {
     let balls = balls(suspension);
     let mesh = suspension.suspension.mesh(&balls).unwrap();
     let viscosity = suspension.flow.viscosity;
@@ -59,10 +47,7 @@ where
 }
 
 /// The fields of all ranks.
-fn shown<const D: usize>(suspension: &SharedSuspension<D>, size: usize) -> Vec<Fields<D>>
-where
-    Dim<D>: Space<D>,
-{
+fn shown<const D: usize>(suspension: &SharedSuspension<D>, size: usize) -> Vec<Fields<D>> {
     let found = on_ranks(size, |ranks| {
         let mut flow = SharedHydrodynamics::new(suspension, ranks);
         flow.predict(&Configuration::at(0.0, &particles())).unwrap();
@@ -81,10 +66,7 @@ fn differences<const D: usize>(
     suspension: &SharedSuspension<D>,
     flow: &Flow<D>,
     pieces: &[Fields<D>],
-) -> [f64; 3]
-where
-    Dim<D>: Space<D>,
-{
+) -> [f64; 3] {
     let (balls, count) = (balls(suspension), 3usize.pow(D as u32));
     let tree = BallTree::new(&balls);
     let mut cells = BTreeMap::new();
@@ -121,10 +103,7 @@ where
     found
 }
 
-fn pieces_are_the_fields_of_the_serial_solver<const D: usize>(lubrication: Lubrication, limits: [f64; 2])
-where
-    Dim<D>: Space<D>,
-{
+fn pieces_are_the_fields_of_the_serial_solver<const D: usize>(lubrication: Lubrication, limits: [f64; 2]) {
     let suspension = suspension::<D>(lubrication);
     let flow = serial(&suspension);
     for size in [1, 2, 3, 8] {

@@ -3,7 +3,7 @@
 
 use gluey_distributed::{BoxFlow, LocalFlow, SurfaceBodies, equal_cuts};
 use gluey_fem::ImplicitTree;
-use gluey_geom::{Aabb, Dim, Space, Twist, Vector, Wrench};
+use gluey_geom::{Aabb, Dim, Twist, Vector, Wrench};
 use gluey_levelset::{Ball, BallTree};
 use gluey_parallel::Ranks;
 use gluey_stokes::{
@@ -62,10 +62,7 @@ impl Example<'_> {
         std::array::from_fn(|d| self.is_periodic && d == 0)
     }
 
-    fn wrenches<const D: usize>(&self) -> Vec<Wrench<D>>
-    where
-        Dim<D>: Space<D>,
-    {
+    fn wrenches<const D: usize>(&self) -> Vec<Wrench<D>> {
         let wrench = |k: usize| {
             let mut wrench = Wrench::default();
             wrench.force[k % D] = 0.3;
@@ -75,10 +72,7 @@ impl Example<'_> {
         (0..self.bodies.len()).map(wrench).collect()
     }
 
-    fn solve<const D: usize>(&self, ranks: &Ranks) -> LocalFlow<D>
-    where
-        Dim<D>: Space<D>,
-    {
+    fn solve<const D: usize>(&self, ranks: &Ranks) -> LocalFlow<D> {
         let (balls, wrenches) = (self.balls(), self.wrenches());
         let tree_of_balls = BallTree::new(&balls);
         let wants =
@@ -92,10 +86,7 @@ impl Example<'_> {
     }
 
     /// Velocities and twists of the serial solver, more exact than those of the ranks.
-    fn serial<const D: usize>(&self, solver: SolverKind) -> (Vec<Vector<D>>, Vec<Twist<D>>)
-    where
-        Dim<D>: Space<D>,
-    {
+    fn serial<const D: usize>(&self, solver: SolverKind) -> (Vec<Vector<D>>, Vec<Twist<D>>) {
         let (balls, wrenches) = (self.balls(), self.wrenches());
         let mesh = self.refinement.mesh(Aabb::unit(), [1; D], self.periodic(), &balls).unwrap();
         let params =
@@ -114,20 +105,14 @@ fn walls<const D: usize>(x: &Vector<D>) -> Vector<D> {
 }
 
 /// Velocities and spins, one after the other.
-fn motions<const D: usize>(twists: &[Twist<D>]) -> Vec<Vector<D>>
-where
-    Dim<D>: Space<D>,
-{
+fn motions<const D: usize>(twists: &[Twist<D>]) -> Vec<Vector<D>> {
     let spin = |twist: &Twist<D>| {
         Vector::from_fn(|d, _| Dim::<D>::spin_slice(&twist.spin).get(d).copied().unwrap_or(0.0))
     };
     twists.iter().flat_map(|twist| [twist.velocity, spin(twist)]).collect()
 }
 
-fn ranks_move_bodies_as_the_serial_solver_does<const D: usize>(example: Example<'_>, solver: SolverKind)
-where
-    Dim<D>: Space<D>,
-{
+fn ranks_move_bodies_as_the_serial_solver_does<const D: usize>(example: Example<'_>, solver: SolverKind) {
     let (balls, (velocity, twists)) = (example.balls::<D>(), example.serial::<D>(solver));
     let alone = example.solve::<D>(&Ranks::alone());
     for size in [1, 2, 3, 4, 8] {

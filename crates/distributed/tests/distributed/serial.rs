@@ -3,7 +3,7 @@
 
 use gluey_distributed::{BoxFlow, equal_cuts};
 use gluey_fem::{ImplicitTree, TreeMesh};
-use gluey_geom::{Aabb, Dim, Space, Vector};
+use gluey_geom::{Aabb, Vector};
 use gluey_stokes::{FlowParams, FlowSolver, Formulation, Lubrication, SolverKind};
 
 use crate::support::on_ranks;
@@ -17,10 +17,7 @@ fn walls<const D: usize>(x: &Vector<D>) -> Vector<D> {
     u
 }
 
-fn ranks_find_the_serial_flow<const D: usize>(level: u8, is_adaptive: bool, solver: SolverKind)
-where
-    Dim<D>: Space<D>,
-{
+fn ranks_find_the_serial_flow<const D: usize>(level: u8, is_adaptive: bool, solver: SolverKind) {
     let wants = |lower: &Vector<D>, h: f64, level: u8| {
         let distance = (lower + Vector::repeat(0.5 * h) - Vector::repeat(0.45)).norm() - 0.3;
         !is_adaptive || level < 2 || distance.abs() < h

@@ -3,7 +3,7 @@
 use std::rc::Rc;
 
 use gluey_distributed::{BoxFlow, FlowMemory, SavedPiece, SharedHydrodynamics, SharedSuspension};
-use gluey_geom::{Dim, Lattice, Matrix, Particle, Space, Twist, Vector, Wrench};
+use gluey_geom::{Dim, Lattice, Matrix, Particle, Twist, Vector, Wrench};
 use gluey_levelset::Ball;
 use gluey_motion::{Configuration, Hydrodynamics, MeanStress};
 use gluey_parallel::Communicator;
@@ -24,10 +24,7 @@ const RATE: f64 = 0.8;
 const PARTICLES: [([f64; 3], f64); 3] =
     [([0.3, 0.4, 0.5], 0.16), ([0.62, 0.5, 0.43], 0.17), ([0.4, 0.95, 0.55], 0.18)];
 
-fn suspension<const D: usize>(level: u8) -> SharedSuspension<D>
-where
-    Dim<D>: Space<D>,
-{
+fn suspension<const D: usize>(level: u8) -> SharedSuspension<D> {
     let mut wrenches = vec![Wrench::default(); PARTICLES.len()];
     (wrenches[1].force[1], wrenches[2].torque[0]) = (0.3, 0.02);
     let flow = BoxFlow { viscosity: 1.0, tolerance: TOLERANCE, max_iterations: 100 };
@@ -42,10 +39,7 @@ where
 }
 
 /// The particles, carried by the shear from [`STRAIN`] to another strain.
-fn particles<const D: usize>(strain: f64) -> Vec<Particle<D>>
-where
-    Dim<D>: Space<D>,
-{
+fn particles<const D: usize>(strain: f64) -> Vec<Particle<D>> {
     let carried = |x: &[f64; 3], d: usize| match d {
         0 => x[0] + (strain - STRAIN) * (x[1] - 0.5),
         _ => x[d],
@@ -61,10 +55,7 @@ fn strains() -> impl Iterator<Item = f64> {
 }
 
 /// Flows of the serial solver, relative to the shear, each from those before it.
-fn serial<const D: usize>(suspension: &SharedSuspension<D>) -> Vec<Flow<D>>
-where
-    Dim<D>: Space<D>,
-{
+fn serial<const D: usize>(suspension: &SharedSuspension<D>) -> Vec<Flow<D>> {
     let solver = SolverKind::Multigrid;
     let formulation = Formulation::Unfitted { lubrication: suspension.suspension.lubrication };
     let params = FlowParams { viscosity: 1.0, formulation, solver, tolerance: TOLERANCE };
@@ -76,10 +67,7 @@ fn serial_flow<const D: usize>(
     suspension: &SharedSuspension<D>,
     solver: &mut FlowSolver<D>,
     strain: f64,
-) -> Flow<D>
-where
-    Dim<D>: Space<D>,
-{
+) -> Flow<D> {
     let lattice = Lattice::new(suspension.suspension.periods).tilted(strain);
     let ball =
         |particle: &Particle<D>| Ball::in_space(&particle.pose.position, particle.radius, &lattice, 0.0);
@@ -98,10 +86,7 @@ where
 /// Motions and the stress of a flow, and iterations.
 type Found<const D: usize> = (Vec<Twist<D>>, MeanStress<D>, usize);
 
-fn predict<const D: usize>(flow: &mut SharedHydrodynamics<'_, D>, strain: f64) -> Found<D>
-where
-    Dim<D>: Space<D>,
-{
+fn predict<const D: usize>(flow: &mut SharedHydrodynamics<'_, D>, strain: f64) -> Found<D> {
     let particles = particles(strain);
     let sheared = Configuration { strain, with_stress: true, ..Configuration::at(0.0, &particles) };
     let found = flow.predict(&sheared).unwrap();
@@ -109,10 +94,7 @@ where
 }
 
 /// Flows by so many ranks.
-fn shared<const D: usize>(suspension: &SharedSuspension<D>, ranks: usize) -> Vec<Found<D>>
-where
-    Dim<D>: Space<D>,
-{
+fn shared<const D: usize>(suspension: &SharedSuspension<D>, ranks: usize) -> Vec<Found<D>> {
     let found = on_ranks(ranks, |ranks| {
         let mut flow = SharedHydrodynamics::new(suspension, ranks);
         strains().map(|strain| predict(&mut flow, strain)).collect::<Vec<_>>()
@@ -122,10 +104,7 @@ where
     found.remove(0)
 }
 
-fn ranks_shear_as_the_serial_solver_does<const D: usize>(level: u8, sizes: &[usize], limits: [[f64; 2]; 2])
-where
-    Dim<D>: Space<D>,
-{
+fn ranks_shear_as_the_serial_solver_does<const D: usize>(level: u8, sizes: &[usize], limits: [[f64; 2]; 2]) {
     let suspension = suspension::<D>(level);
     let serial = serial(&suspension);
     for &size in sizes {
@@ -145,10 +124,7 @@ where
 }
 
 /// The largest differences of motions and of stresses.
-fn differences<const D: usize>((twists, stress, _): &Found<D>, serial: &Flow<D>, strain: f64) -> [f64; 2]
-where
-    Dim<D>: Space<D>,
-{
+fn differences<const D: usize>((twists, stress, _): &Found<D>, serial: &Flow<D>, strain: f64) -> [f64; 2] {
     let largest = |m: f64, x: f64| if x.is_nan() { f64::NAN } else { m.max(x.abs()) };
     let mut difference = 0.0;
     for ((twist, serial), particle) in twists.iter().zip(&serial.twists).zip(particles::<D>(strain)) {
@@ -175,10 +151,7 @@ fn ranks_shear_as_the_serial_solver_does_in_3d() {
 
 /// A flow that goes on from the pieces of others, and what these found: the same bits on as many ranks, the
 /// same but for the tolerance on others.
-fn flows_go_on_from_pieces<const D: usize>(level: u8, limit: f64)
-where
-    Dim<D>: Space<D>,
-{
+fn flows_go_on_from_pieces<const D: usize>(level: u8, limit: f64) {
     let suspension = suspension::<D>(level);
     for (from, sizes) in [(3, &[3, 2][..]), (2, &[5]), (4, &[1])] {
         let last = strains().last().unwrap();

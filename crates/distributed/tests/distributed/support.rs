@@ -1,7 +1,7 @@
 //! Set-ups and measurements that the tests share.
 
 use gluey_distributed::LocalFlow;
-use gluey_geom::{Aabb, Dim, Space, Vector};
+use gluey_geom::{Aabb, Vector};
 use gluey_levelset::{Ball, LevelSet};
 use gluey_parallel::{RankFailure, Ranks, Threads};
 use gluey_stokes::{Lubrication, Refinement, Suspension};
@@ -13,10 +13,7 @@ pub fn suspension<const D: usize>(
     refinement: Refinement,
     lubrication: Lubrication,
     radii: Vec<f64>,
-) -> Suspension<D>
-where
-    Dim<D>: Space<D>,
-{
+) -> Suspension<D> {
     Suspension {
         domain: Aabb::unit(),
         roots: [1; D],
@@ -41,10 +38,7 @@ pub fn on_ranks<R: Send>(size: usize, work: impl Fn(&Ranks) -> R + Sync) -> Resu
 }
 
 /// Velocities of all ranks, one after the other.
-pub fn velocities<const D: usize>(parts: &[LocalFlow<D>]) -> Vec<Vector<D>>
-where
-    Dim<D>: Space<D>,
-{
+pub fn velocities<const D: usize>(parts: &[LocalFlow<D>]) -> Vec<Vector<D>> {
     parts.iter().flat_map(|part| part.velocity()).collect()
 }
 

@@ -3,7 +3,7 @@
 
 use gluey_distributed::{BoxFlow, LocalFlow, SurfaceBodies, equal_cuts};
 use gluey_fem::ImplicitTree;
-use gluey_geom::{Aabb, Dim, Space, Twist, Vector, Wrench};
+use gluey_geom::{Aabb, Dim, Twist, Vector, Wrench};
 use gluey_levelset::{Ball, BallTree};
 use gluey_parallel::Ranks;
 use gluey_stokes::{
@@ -41,10 +41,7 @@ struct Example<const D: usize> {
     drive: Drive,
 }
 
-impl<const D: usize> Example<D>
-where
-    Dim<D>: Space<D>,
-{
+impl<const D: usize> Example<D> {
     fn refinement(&self) -> Refinement {
         let [coarsest, surface] = self.levels;
         Refinement { coarsest, surface, band: 2.0 }
@@ -173,20 +170,14 @@ fn shear<const D: usize>(x: &Vector<D>) -> Vector<D> {
     Vector::from_fn(|d, _| if d == 0 { x[1] - 0.5 } else { 0.0 })
 }
 
-fn distance<const D: usize>(a: &Twist<D>, b: &Twist<D>) -> f64
-where
-    Dim<D>: Space<D>,
-{
+fn distance<const D: usize>(a: &Twist<D>, b: &Twist<D>) -> f64 {
     let spins = Dim::<D>::spin_slice(&a.spin).iter().zip(Dim::<D>::spin_slice(&b.spin));
     let spins = spins.map(|(a, b)| (a - b).abs());
     spins.chain([(a.velocity - b.velocity).norm()]).fold(0.0, f64::max)
 }
 
 /// Two bodies of different radii with this gap over the first one's, and a third across the border.
-fn three<const D: usize>(gap: f64, levels: [u8; 2], lubrication: Lubrication) -> Example<D>
-where
-    Dim<D>: Space<D>,
-{
+fn three<const D: usize>(gap: f64, levels: [u8; 2], lubrication: Lubrication) -> Example<D> {
     let [a, b] = [0.13, 0.1];
     let first = Vector::<D>::from_fn(|d, _| [0.37, 0.46, 0.52][d]);
     let normal = Vector::<D>::from_fn(|d, _| [0.8, 0.55, 0.24][d]).normalize();

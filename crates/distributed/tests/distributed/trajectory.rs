@@ -3,7 +3,7 @@
 
 use gluey_contact::{BodyStep, ContactModel, ContactParams, PairContact};
 use gluey_distributed::{BoxFlow, SharedHydrodynamics, SharedSuspension};
-use gluey_geom::{Dim, Particle, Space, Vector, Wrench};
+use gluey_geom::{Particle, Vector, Wrench};
 use gluey_levelset::Ball;
 use gluey_motion::{Configuration, FlowStatistics, Hydrodynamics, Integrator, Prediction, Scheme};
 use gluey_stokes::{
@@ -46,10 +46,7 @@ const TRIO: Meeting = Meeting {
 fn suspension<const D: usize>(
     Meeting { places, radius, surface, tolerance, .. }: Meeting,
     lubrication: Lubrication,
-) -> SharedSuspension<D>
-where
-    Dim<D>: Space<D>,
-{
+) -> SharedSuspension<D> {
     let mut wrenches = vec![Wrench::default(); places.len()];
     wrenches[1].force[1] = if places.len() == 2 { 0.01 } else { 0.0 };
     let flow = BoxFlow { viscosity: 1.0, tolerance, max_iterations: 500 };
@@ -59,10 +56,7 @@ where
     SharedSuspension { flow, suspension: Suspension { wrenches, ..free } }
 }
 
-fn particles<const D: usize>(Meeting { places, radius, .. }: Meeting) -> Vec<Particle<D>>
-where
-    Dim<D>: Space<D>,
-{
+fn particles<const D: usize>(Meeting { places, radius, .. }: Meeting) -> Vec<Particle<D>> {
     let at = |&[x, y]: &[f64; 2]| Particle::new(Vector::from_fn(|d, _| [x, y, 0.5][d]), radius);
     places.iter().map(at).collect()
 }
@@ -80,7 +74,6 @@ struct Trajectory<const D: usize> {
 
 fn trajectory<const D: usize, H: Hydrodynamics<D>>(meeting: Meeting, mut flow: H) -> Trajectory<D>
 where
-    Dim<D>: Space<D>,
     PairContact<D>: ContactModel<D>,
 {
     let (mut particles, mut integrator) = (particles::<D>(meeting), Integrator::new(Scheme::AdamsBashforth2));
@@ -100,18 +93,12 @@ where
 }
 
 /// The serial solver of the same flow.
-struct Serial<'a, const D: usize>
-where
-    Dim<D>: Space<D>,
-{
+struct Serial<'a, const D: usize> {
     suspension: &'a SharedSuspension<D>,
     solver: FlowSolver<D>,
 }
 
-fn solver<const D: usize>(suspension: &SharedSuspension<D>) -> FlowSolver<D>
-where
-    Dim<D>: Space<D>,
-{
+fn solver<const D: usize>(suspension: &SharedSuspension<D>) -> FlowSolver<D> {
     let SharedSuspension { flow, suspension: Suspension { lubrication, .. } } = suspension;
     let formulation = Formulation::Unfitted { lubrication: *lubrication };
     let solver = SolverKind::Multigrid;
@@ -119,19 +106,13 @@ where
     FlowSolver::new(params).unwrap()
 }
 
-impl<'a, const D: usize> Serial<'a, D>
-where
-    Dim<D>: Space<D>,
-{
+impl<'a, const D: usize> Serial<'a, D> {
     fn new(suspension: &'a SharedSuspension<D>) -> Self {
         Self { suspension, solver: solver(suspension) }
     }
 }
 
-impl<const D: usize> Hydrodynamics<D> for Serial<'_, D>
-where
-    Dim<D>: Space<D>,
-{
+impl<const D: usize> Hydrodynamics<D> for Serial<'_, D> {
     type Error = StokesError;
 
     fn predict(&mut self, configuration: &Configuration<'_, D>) -> Result<Prediction<D>, StokesError> {
@@ -155,7 +136,6 @@ fn ranks_take_particles_where_the_serial_solver_does<const D: usize>(
     limit: f64,
 ) -> bool
 where
-    Dim<D>: Space<D>,
     PairContact<D>: ContactModel<D>,
 {
     let suspension = suspension::<D>(meeting, lubrication);

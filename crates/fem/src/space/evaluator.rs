@@ -1,6 +1,6 @@
 //! Evaluation of a field of one mesh at the nodes of another over the same box, and of a velocity at a point.
 
-use gluey_geom::{Dim, Space, Twist, Vector};
+use gluey_geom::{Dim, Twist, Vector};
 use rayon::prelude::*;
 
 use super::nodes::NodeMap;
@@ -111,10 +111,7 @@ impl<'a, const D: usize> Evaluator<'a, D> {
     /// Velocity and half the vorticity of a nodal velocity field at a point. The gradient jumps between
     /// cells: at a face, an edge or a corner it is the mean over the `2^D` orthants around the point. A point
     /// outside the mesh stands for the nearest one of the box.
-    pub fn motion_at(&self, nodes: &NodeMap<D>, velocity: &[f64], point: &Vector<D>) -> Twist<D>
-    where
-        Dim<D>: Space<D>,
-    {
+    pub fn motion_at(&self, nodes: &NodeMap<D>, velocity: &[f64], point: &Vector<D>) -> Twist<D> {
         let mut twist = Twist::default();
         let share = 0.5f64.powi(D as i32);
         for (cell, x) in (0..1 << D).filter_map(|orthant| self.locate_in_orthant(point, orthant)) {
@@ -189,10 +186,7 @@ mod tests {
         (mesh, nodes)
     }
 
-    fn motion_at<const D: usize>(u: impl Fn(&Vector<D>) -> Vector<D>, x: Vector<D>) -> Twist<D>
-    where
-        Dim<D>: Space<D>,
-    {
+    fn motion_at<const D: usize>(u: impl Fn(&Vector<D>) -> Vector<D>, x: Vector<D>) -> Twist<D> {
         let (mesh, nodes) = two_sizes::<D>();
         let field: Vec<f64> = (0..nodes.node_count()).flat_map(|n| u(&nodes.point(n)).data.0[0]).collect();
         Evaluator::new(&mesh).motion_at(&nodes, &field, &x)
@@ -201,10 +195,7 @@ mod tests {
     /// In `u = A x + b` and `u = x_1^2 e_0` the velocity is `u` and the spin half the vorticity: inside
     /// cells, on faces, at corners, where sizes change, on the walls. The first axis has no part in it, so
     /// that points may lie beyond it.
-    fn linear_and_quadratic_fields_are_exact<const D: usize>()
-    where
-        Dim<D>: Space<D>,
-    {
+    fn linear_and_quadratic_fields_are_exact<const D: usize>() {
         let y = |x: &Vector<D>| Vector::<D>::from_fn(|d, _| if d == 0 { 0.0 } else { x[d] });
         let matrix = gluey_geom::Matrix::<D>::from_fn(|i, j| 0.3 + 0.9 * i as f64 - 0.7 * j as f64);
         let linear = |x: &Vector<D>| matrix * y(x) + Vector::repeat(0.2);

@@ -2,7 +2,6 @@
 
 use std::path::Path;
 
-use gluey_geom::{Dim, Space};
 use gluey_suspension::ball_volume;
 use gluey_suspension::packing::{Packing, PackingError, PackingParams};
 
@@ -116,10 +115,7 @@ fn check_count(case: &Case, suspension: &SuspensionSpec, key: &Key) -> Result<()
     }
 }
 
-fn pack<const D: usize>(case: &Case, params: &PackingParams) -> Result<Vec<ParticleSpec>, PackingError>
-where
-    Dim<D>: Space<D>,
-{
+fn pack<const D: usize>(case: &Case, params: &PackingParams) -> Result<Vec<ParticleSpec>, PackingError> {
     let packing = Packing::<D>::new(&case.container(), params)?;
     let particles = packing.positions.iter().zip(packing.radii);
     Ok(particles.map(|(x, radius)| ParticleSpec::new(x.iter().copied().collect(), radius)).collect())

@@ -1,6 +1,6 @@
 //! Forces and torques on the particles of a case.
 
-use gluey_geom::{Dim, Space, Vector, Wrench};
+use gluey_geom::{Dim, Vector, Wrench};
 use gluey_suspension::{Repulsion, ball_volume};
 
 use super::{Case, ParticleSpec, RepulsionSpec};
@@ -20,10 +20,7 @@ impl Case {
     }
 
     /// Force and torque on each particle of a checked case; no entries where there are none on any.
-    pub(crate) fn wrenches<const D: usize>(&self) -> Vec<Wrench<D>>
-    where
-        Dim<D>: Space<D>,
-    {
+    pub(crate) fn wrenches<const D: usize>(&self) -> Vec<Wrench<D>> {
         let acts = |particle: &ParticleSpec| is_given(&particle.force) || is_given(&particle.torque);
         if !(is_given(&self.gravity) || self.particles.iter().any(acts)) {
             return Vec::new();

@@ -1,6 +1,6 @@
 //! Particles of a case that are held or driven, and what drives the fluid beside them.
 
-use gluey_geom::{Dim, Space, Twist, Vector};
+use gluey_geom::{Twist, Vector};
 
 use super::error::Key;
 use super::findings::CaseFindings;
@@ -15,10 +15,7 @@ impl Case {
 
     /// Velocity and spin of each particle of a checked case that is held or driven; no entries where all are
     /// free.
-    pub(crate) fn given_twists<const D: usize>(&self) -> Vec<Option<Twist<D>>>
-    where
-        Dim<D>: Space<D>,
-    {
+    pub(crate) fn given_twists<const D: usize>(&self) -> Vec<Option<Twist<D>>> {
         if !self.gives_motions() {
             return Vec::new();
         }

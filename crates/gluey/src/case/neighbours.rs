@@ -1,6 +1,6 @@
 //! Particles of a case that are near each other, across periodic borders too.
 
-use gluey_geom::{Dim, Space, Vector};
+use gluey_geom::Vector;
 use gluey_levelset::nearest_image;
 use gluey_suspension::for_each_pair;
 
@@ -43,10 +43,7 @@ fn neighbours(case: &Case, first: usize, second: usize) -> NearParticles {
 }
 
 /// The second and the first of pairs that are about as near as that, in any image.
-fn candidates<const D: usize>(case: &Case, reach: f64) -> Vec<(usize, usize)>
-where
-    Dim<D>: Space<D>,
-{
+fn candidates<const D: usize>(case: &Case, reach: f64) -> Vec<(usize, usize)> {
     let particles = case.start::<D>();
     let centers: Vec<Vector<D>> = particles.iter().map(|particle| particle.pose.position).collect();
     let largest = particles.iter().map(|particle| particle.radius).fold(0.0, f64::max);

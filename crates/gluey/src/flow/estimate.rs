@@ -10,7 +10,6 @@
 
 use std::f64::consts::PI;
 
-use gluey_geom::{Dim, Space};
 use gluey_motion::Configuration;
 use gluey_stokes::{Discretisation, Refinement};
 
@@ -99,10 +98,7 @@ impl MeshSize {
 }
 
 /// Cells and unknowns of the first mesh.
-fn counts<const D: usize>(case: &Case) -> Result<(usize, usize), FlowError>
-where
-    Dim<D>: Space<D>,
-{
+fn counts<const D: usize>(case: &Case) -> Result<(usize, usize), FlowError> {
     let suspension = stokes_flow::<D>(case)?.suspension;
     let balls = suspension.balls(&Configuration::at(0.0, &case.start()));
     let discretisation = Discretisation::new(suspension.mesh(&balls)?);

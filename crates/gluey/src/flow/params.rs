@@ -1,6 +1,6 @@
 //! Mesh and parameters of the flow of a case.
 
-use gluey_geom::{Aabb, Dim, Space, Vector};
+use gluey_geom::{Aabb, Vector};
 use gluey_stokes::{FlowParams, Refinement, SolverKind, Suspension};
 
 use super::error::FlowError;
@@ -10,10 +10,7 @@ use crate::case::{Case, Formulation, Lubrication, Solver};
 ///
 /// # Errors
 /// [`FlowError::Box`] if it has no mesh.
-pub(crate) fn suspension<const D: usize>(case: &Case) -> Result<Suspension<D>, FlowError>
-where
-    Dim<D>: Space<D>,
-{
+pub(crate) fn suspension<const D: usize>(case: &Case) -> Result<Suspension<D>, FlowError> {
     let corner = |x: Vec<f64>| Vector::<D>::from_fn(|d, _| x[d]);
     let domain = Aabb { lower: corner(case.lower()), upper: corner(case.upper()) };
     let roots = case.root_cells().and_then(|roots| roots.try_into().ok());

@@ -1,6 +1,5 @@
 //! Several flows around the particles of a case where they are at time 0.
 
-use gluey_geom::{Dim, Space};
 use gluey_motion::Configuration;
 use gluey_stokes::Prepared;
 
@@ -11,10 +10,7 @@ use crate::case::Case;
 ///
 /// # Errors
 /// [`FlowError`] if the box cannot be meshed or a parameter is out of range.
-pub fn prepared_flow<const D: usize>(case: &Case) -> Result<Prepared<'static, D>, FlowError>
-where
-    Dim<D>: Space<D>,
-{
+pub fn prepared_flow<const D: usize>(case: &Case) -> Result<Prepared<'static, D>, FlowError> {
     let flow = stokes_flow::<D>(case)?;
     let balls = flow.suspension.balls(&Configuration::at(0.0, &case.start()));
     let mesh = flow.suspension.mesh(&balls)?;

@@ -13,7 +13,7 @@
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
-use gluey_geom::{Dim, Space, Vector};
+use gluey_geom::{Dim, Vector};
 
 use super::append_log::{Draft, DraftMark, RowsError};
 use super::pair_forces::{ContactForces, PairForces};
@@ -43,10 +43,7 @@ pub struct CsvWriter {
 
 impl CsvWriter {
     /// Starts the files of a run of so many particles.
-    pub fn create<const D: usize>(path: &Path, particle_count: usize) -> Result<Self, RowsError>
-    where
-        Dim<D>: Space<D>,
-    {
+    pub fn create<const D: usize>(path: &Path, particle_count: usize) -> Result<Self, RowsError> {
         let rows = Draft::with_header(path, &header::<D>(particle_count))?;
         let gaps = gaps_path(path, particle_count);
         let gaps = gaps.map(|path| Draft::with_header(&path, GAPS_HEADER)).transpose()?;
@@ -61,10 +58,7 @@ impl CsvWriter {
         gaps: Option<&DraftMark>,
         particle_count: usize,
         mut visit: impl FnMut(&Instant<D>),
-    ) -> Result<Self, RowsError>
-    where
-        Dim<D>: Space<D>,
-    {
+    ) -> Result<Self, RowsError> {
         let mut rows = Draft::resume(path, rows)?;
         let gaps = gaps_path(path, particle_count).zip(gaps);
         let mut gaps = gaps.map(|(path, mark)| Draft::resume(&path, mark)).transpose()?;
@@ -84,10 +78,7 @@ impl CsvWriter {
         &mut self,
         row: &TrajectoryRow<'_, D>,
         forces: &PairForces<'_>,
-    ) -> Result<Option<f64>, RowsError>
-    where
-        Dim<D>: Space<D>,
-    {
+    ) -> Result<Option<f64>, RowsError> {
         let a = row.mean_radius();
         let smallest = match &mut self.gaps {
             None => row.pairs().map(|(first, second)| row.gap(first, second)).reduce(f64::min),
@@ -126,10 +117,7 @@ pub(crate) fn gaps_path(path: &Path, particle_count: usize) -> Option<PathBuf> {
 }
 
 /// The first line of the trajectory.
-pub fn header<const D: usize>(particle_count: usize) -> String
-where
-    Dim<D>: Space<D>,
-{
+pub fn header<const D: usize>(particle_count: usize) -> String {
     let mut names = vec!["t".to_owned()];
     for particle in 1..=particle_count {
         names.extend(AXES[..D].iter().map(|axis| format!("{axis}{particle}")));
@@ -149,10 +137,7 @@ where
     names.join(",")
 }
 
-fn line<const D: usize>(row: &TrajectoryRow<'_, D>, smallest_gap_over_a: Option<f64>) -> String
-where
-    Dim<D>: Space<D>,
-{
+fn line<const D: usize>(row: &TrajectoryRow<'_, D>, smallest_gap_over_a: Option<f64>) -> String {
     let a = row.mean_radius();
     let centers = row.particles.iter().flat_map(|particle| particle.pose.position.iter().copied());
     let gaps: Vec<f64> = match row.particles.len() > MOST_WITH_PAIR_COLUMNS {
@@ -164,10 +149,7 @@ where
 }
 
 /// Reads a row of so many particles back.
-fn parse<const D: usize>(text: &str, particle_count: usize) -> Option<Instant<D>>
-where
-    Dim<D>: Space<D>,
-{
+fn parse<const D: usize>(text: &str, particle_count: usize) -> Option<Instant<D>> {
     let numbers: Vec<f64> = text.split(',').map(|cell| cell.parse().ok()).collect::<Option<_>>()?;
     let pair_count = particle_count * particle_count.saturating_sub(1) / 2;
     let gap_count = if particle_count > MOST_WITH_PAIR_COLUMNS { 1 } else { pair_count };
@@ -187,10 +169,7 @@ fn gap_lines<const D: usize>(
     near: &[PairGap],
     cutoff: f64,
     forces: &PairForces<'_>,
-) -> String
-where
-    Dim<D>: Space<D>,
-{
+) -> String {
     let (a, time) = (row.mean_radius(), format!("{:.16e}", row.time));
     let of_contacts = ContactForces::of(forces);
     let radius = |particle: usize| row.particles[particle].radius;
@@ -239,10 +218,7 @@ mod tests {
         assert!(header::<2>(10).contains(",y10,min_gap_over_a,omega1,"));
     }
 
-    fn rows_read_back<const D: usize>()
-    where
-        Dim<D>: Space<D>,
-    {
+    fn rows_read_back<const D: usize>() {
         for count in [1, 2, 3, 9, 10, 12] {
             let particles: Vec<_> =
                 (0..count).map(|n| Particle::new(Vector::<D>::repeat(n as f64 / 3.0), 0.1)).collect();

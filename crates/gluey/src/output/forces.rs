@@ -5,7 +5,7 @@
 //! that of the force density on the box. Before them stand the mean velocity of fluid and particles over the
 //! box and the force density.
 
-use gluey_geom::{Dim, Space};
+use gluey_geom::Dim;
 use gluey_motion::Holding;
 
 use super::line_of;
@@ -28,10 +28,7 @@ pub fn header<const D: usize>(particles: impl IntoIterator<Item = usize>) -> Str
 }
 
 /// A row as text, with its end of line.
-pub fn line<const D: usize>(time: f64, holding: &Holding<D>) -> String
-where
-    Dim<D>: Space<D>,
-{
+pub fn line<const D: usize>(time: f64, holding: &Holding<D>) -> String {
     let of_particles = holding.wrenches.iter().flat_map(|(_, wrench)| {
         wrench.force.iter().chain(Dim::<D>::spin_slice(&wrench.torque)).copied().collect::<Vec<f64>>()
     });

@@ -24,7 +24,7 @@ mod xml;
 use std::path::{Path, PathBuf};
 
 use gluey_contact::{Contact, Domain, Partner};
-use gluey_geom::{Dim, Particle, Space, Spin, Twist, Vector};
+use gluey_geom::{Dim, Particle, Spin, Twist, Vector};
 use gluey_motion::Fields;
 
 use super::{FileError, prepare_folder_of, pvd, remove_stale};
@@ -45,10 +45,7 @@ const ROUNDING: f64 = 1e-6;
 
 /// Particles, contacts and fields at one instant.
 #[derive(Clone, Debug)]
-pub struct VtkFrame<const D: usize>
-where
-    Dim<D>: Space<D>,
-{
+pub struct VtkFrame<const D: usize> {
     /// Step that starts here.
     pub step: usize,
     /// Time.
@@ -113,10 +110,7 @@ impl VtkWriter {
     }
 
     /// Writes one instant.
-    pub fn write<const D: usize>(&mut self, frame: &VtkFrame<D>) -> Result<(), FileError>
-    where
-        Dim<D>: Space<D>,
-    {
+    pub fn write<const D: usize>(&mut self, frame: &VtkFrame<D>) -> Result<(), FileError> {
         let balls = shown(&frame.particles, frame.in_box.as_ref());
         let pieces = [
             frame.fields.as_ref().map(fields_piece),
@@ -163,10 +157,7 @@ fn file_name(series: &str, step: usize) -> String {
     format!("{series}-{step:06}.vtu")
 }
 
-fn particles_piece<const D: usize>(frame: &VtkFrame<D>, balls: &[Shown<D>]) -> GridPiece
-where
-    Dim<D>: Space<D>,
-{
+fn particles_piece<const D: usize>(frame: &VtkFrame<D>, balls: &[Shown<D>]) -> GridPiece {
     let (particles, twists) = (&frame.particles, &frame.twists);
     let count = balls.len();
     let velocity = |ball: &Shown<D>| {
@@ -198,10 +189,7 @@ where
 
 /// Vertices at the centres and lines between what is in contact. Foot points on walls and centres of images
 /// follow the centres, without a vertex.
-fn contacts_piece<const D: usize>(frame: &VtkFrame<D>, balls: &[Shown<D>]) -> GridPiece
-where
-    Dim<D>: Space<D>,
-{
+fn contacts_piece<const D: usize>(frame: &VtkFrame<D>, balls: &[Shown<D>]) -> GridPiece {
     let (contacts, count) = (&frame.contacts, frame.particles.len());
     let positions: Vec<Vector<D>> = frame.particles.iter().map(|particle| particle.pose.position).collect();
     let mut points = centers(&balls[..count]);
@@ -238,10 +226,7 @@ where
 }
 
 /// A plane spin turns about z.
-fn spin_in_space<const D: usize>(spin: &Spin<D>) -> [f64; 3]
-where
-    Dim<D>: Space<D>,
-{
+fn spin_in_space<const D: usize>(spin: &Spin<D>) -> [f64; 3] {
     match Dim::<D>::spin_slice(spin) {
         [x, y, z] => [*x, *y, *z],
         other => [0.0, 0.0, other.first().copied().unwrap_or(0.0)],

@@ -15,7 +15,7 @@ use std::path::{Path, PathBuf};
 
 use flate2::Compression;
 use flate2::write::GzEncoder;
-use gluey_geom::{Dim, Particle, Space, Twist, Vector};
+use gluey_geom::{Dim, Particle, Twist, Vector};
 use gluey_suspension::Container;
 
 use super::{FileError, prepare_folder_of, write_atomically};
@@ -32,10 +32,7 @@ const COMPRESSION_LEVEL: u32 = 1;
 
 /// Particles at one instant.
 #[derive(Clone, Debug, PartialEq)]
-pub struct XyzFrame<const D: usize>
-where
-    Dim<D>: Space<D>,
-{
+pub struct XyzFrame<const D: usize> {
     /// Time.
     pub time: f64,
     /// Shear strain of the undisturbed flow.
@@ -55,10 +52,7 @@ where
     pub contact_forces: Option<Vec<Vector<D>>>,
 }
 
-impl<const D: usize> XyzFrame<D>
-where
-    Dim<D>: Space<D>,
-{
+impl<const D: usize> XyzFrame<D> {
     /// Particles and their twists at a time and a strain.
     pub fn of(
         time: f64,
@@ -163,10 +157,7 @@ impl XyzWriter {
     }
 
     /// Writes the frame of a step, `particles-<step>.xyz`, which appears when it is complete.
-    pub fn write<const D: usize>(&self, step: usize, frame: &XyzFrame<D>) -> Result<(), FileError>
-    where
-        Dim<D>: Space<D>,
-    {
+    pub fn write<const D: usize>(&self, step: usize, frame: &XyzFrame<D>) -> Result<(), FileError> {
         let name = format!("particles-{step:06}.xyz{}", if self.gzip { ".gz" } else { "" });
         let (path, text) = (self.folder.join(name), frame.text());
         if !self.gzip {
@@ -185,10 +176,7 @@ mod tests {
 
     use super::*;
 
-    fn frame<const D: usize>(tilt: f64) -> XyzFrame<D>
-    where
-        Dim<D>: Space<D>,
-    {
+    fn frame<const D: usize>(tilt: f64) -> XyzFrame<D> {
         let bounds =
             Aabb { lower: Vector::repeat(-0.25), upper: Vector::from_fn(|d, _| [2.0, 1.0, 0.75][d]) };
         let container = Container::new(bounds, std::array::from_fn(|d| d != 2)).tilted(tilt);
@@ -201,10 +189,7 @@ mod tests {
         frame
     }
 
-    fn reads_back<const D: usize>()
-    where
-        Dim<D>: Space<D>,
-    {
+    fn reads_back<const D: usize>() {
         let folder = tempfile::tempdir().expect("a folder");
         for (gzip, tilt) in [(false, 0.0), (true, 0.25)] {
             let mut written = frame::<D>(tilt);

@@ -5,8 +5,6 @@ use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
 
-use gluey_geom::{Dim, Space};
-
 use super::options::RunOptions;
 use crate::case::Case;
 use crate::checkpoint::{Checkpoint, CheckpointSummary, FlowPieces};
@@ -80,10 +78,7 @@ impl CheckpointFile {
         &mut self,
         checkpoint: &Checkpoint<D>,
         case: &Case,
-    ) -> Result<Vec<Notice>, FileError>
-    where
-        Dim<D>: Space<D>,
-    {
+    ) -> Result<Vec<Notice>, FileError> {
         let notices = self.keep_the_last()?;
         checkpoint.write(case, &self.path)?;
         self.pieces.push_back(checkpoint.pieces.clone());

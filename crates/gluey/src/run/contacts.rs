@@ -3,16 +3,13 @@
 use gluey_contact::{
     ContactError, ContactLaw, ContactModel, ContactNetwork, ContactParams, Domain, PairContact, WithFixed,
 };
-use gluey_geom::{Dim, Particle, Space, Vector};
+use gluey_geom::{Particle, Vector};
 
 use crate::case::Case;
 use crate::output::PairForces;
 
 /// A model of contact that says within what.
-pub(super) trait Surrounded<const D: usize>: ContactModel<D>
-where
-    Dim<D>: Space<D>,
-{
+pub(super) trait Surrounded<const D: usize>: ContactModel<D> {
     /// Walls and periods.
     fn domain(&self) -> &Domain<D>;
 
@@ -46,10 +43,7 @@ pub(super) fn of_case<const D: usize>(case: &Case) -> PairContact<D, WithFixed> 
     PairContact::with_mobility(case.contact.params(), fixed).within(case.surroundings())
 }
 
-impl<const D: usize> Surrounded<D> for PairContact<D, WithFixed>
-where
-    Dim<D>: Space<D>,
-{
+impl<const D: usize> Surrounded<D> for PairContact<D, WithFixed> {
     fn domain(&self) -> &Domain<D> {
         self.domain()
     }
@@ -60,10 +54,7 @@ where
 }
 
 #[cfg(feature = "ranks")]
-impl<const D: usize> Surrounded<D> for gluey_distributed::SharedContact<'_, D>
-where
-    Dim<D>: Space<D>,
-{
+impl<const D: usize> Surrounded<D> for gluey_distributed::SharedContact<'_, D> {
     fn domain(&self) -> &Domain<D> {
         self.domain()
     }

@@ -3,7 +3,6 @@
 use std::path::Path;
 
 use gluey_distributed::{FlowMemory, SavedPiece, SharedSuspension};
-use gluey_geom::{Dim, Space};
 use gluey_parallel::{Communicator, Ranks};
 
 use crate::case::Case;
@@ -42,10 +41,7 @@ pub(super) fn restore<const D: usize>(
     suspension: &SharedSuspension<D>,
     ranks: &Ranks,
     memory: &FlowMemory<D>,
-) -> Result<(), CheckpointError>
-where
-    Dim<D>: Space<D>,
-{
+) -> Result<(), CheckpointError> {
     let read = || {
         let Some(pieces) = Checkpoint::<D>::read(case, checkpoint)?.pieces else { return Ok(()) };
         let saved = own_pieces(checkpoint, &pieces, ranks)?;

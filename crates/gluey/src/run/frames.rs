@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use gluey_contact::ContactLaw;
-use gluey_geom::{Dim, Space, Vector};
+use gluey_geom::Vector;
 use gluey_parallel::Communicator;
 use gluey_suspension::Container;
 
@@ -64,20 +64,14 @@ impl StreamOptions {
 }
 
 /// The streams of a run that is going on.
-pub(super) struct Frames<const D: usize>
-where
-    Dim<D>: Space<D>,
-{
+pub(super) struct Frames<const D: usize> {
     streams: Vec<(Interval, Stream<D>)>,
     /// Number of this rank among those that share the flow.
     rank: usize,
     on_their_way: OnTheirWay,
 }
 
-enum Stream<const D: usize>
-where
-    Dim<D>: Space<D>,
-{
+enum Stream<const D: usize> {
     Vtk {
         writer: FrameWriter<D>,
         with_fields: bool,
@@ -90,10 +84,7 @@ where
     },
 }
 
-impl<const D: usize> Frames<D>
-where
-    Dim<D>: Space<D>,
-{
+impl<const D: usize> Frames<D> {
     /// Prepares the folders for a run that begins at `step`; of the steps done, those with files stay listed.
     pub fn create(
         case: &Case,
@@ -208,7 +199,6 @@ fn contact_forces<const D: usize, H, C>(
     simulation: &Simulation<D, H, C>,
 ) -> Result<Option<Vec<Vector<D>>>, RunError>
 where
-    Dim<D>: Space<D>,
     H: gluey_motion::Hydrodynamics<D>,
     C: Surrounded<D>,
 {
@@ -224,7 +214,6 @@ where
 /// The box as it is sheared now.
 fn container<const D: usize, H, C>(case: &Case, simulation: &Simulation<D, H, C>) -> Container<D>
 where
-    Dim<D>: Space<D>,
     H: gluey_motion::Hydrodynamics<D>,
     C: Surrounded<D>,
 {

@@ -5,8 +5,6 @@ use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex};
 
-use gluey_geom::{Dim, Space};
-
 use super::checkpoint_file::CheckpointFile;
 use super::last_steps::{Ended, OfRun, locked};
 use super::log;
@@ -20,10 +18,7 @@ use crate::progress::Notice;
 
 /// The last whole step of a run, and the files that tell of it.
 #[derive(Debug)]
-pub(super) struct LastStep<const D: usize>
-where
-    Dim<D>: Space<D>,
-{
+pub(super) struct LastStep<const D: usize> {
     case: Case,
     paths: ResultPaths,
     /// Where it is saved, if it is to be.
@@ -38,10 +33,7 @@ where
     pub is_ending: bool,
 }
 
-impl<const D: usize> LastStep<D>
-where
-    Dim<D>: Space<D>,
-{
+impl<const D: usize> LastStep<D> {
     /// That of a run that goes on after `step` steps, before it keeps any.
     pub fn before(
         case: &Case,
@@ -114,10 +106,7 @@ where
     }
 }
 
-impl<const D: usize> OfRun for Mutex<LastStep<D>>
-where
-    Dim<D>: Space<D>,
-{
+impl<const D: usize> OfRun for Mutex<LastStep<D>> {
     fn save(&self) -> Vec<Notice> {
         let mut last = locked(self);
         if last.is_ending { Vec::new() } else { last.save_or_tell() }

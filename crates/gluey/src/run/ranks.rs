@@ -4,7 +4,6 @@ use std::path::Path;
 use std::rc::Rc;
 
 use gluey_distributed::{BoxFlow, FlowMemory, SharedContact, SharedHydrodynamics, SharedSuspension};
-use gluey_geom::{Dim, Space};
 use gluey_parallel::{Communicator, Ranks};
 
 use super::contacts;
@@ -42,10 +41,7 @@ fn run_beside<const D: usize>(
     options: &RunOptions,
     progress: &dyn Progress,
     ranks: &Ranks,
-) -> Result<Option<RunReport>, RunError>
-where
-    Dim<D>: Space<D>,
-{
+) -> Result<Option<RunReport>, RunError> {
     let suspension = suspension::<D>(case).map_err(HydrodynamicsError::from)?;
     let flow = BoxFlow { viscosity: 1.0, tolerance: case.flow.tolerance, max_iterations: MOST_ITERATIONS };
     let suspension = SharedSuspension { flow, suspension };

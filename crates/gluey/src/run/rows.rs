@@ -1,6 +1,5 @@
 //! The tables of a run and the measures of their rows, on rank zero.
 
-use gluey_geom::{Dim, Space};
 use gluey_motion::Hydrodynamics;
 
 use super::checkpoint_file::CheckpointFile;
@@ -22,10 +21,7 @@ pub(super) struct RowFiles<const D: usize> {
     pub measures: RunMeasures<D>,
 }
 
-impl<const D: usize> RowFiles<D>
-where
-    Dim<D>: Space<D>,
-{
+impl<const D: usize> RowFiles<D> {
     /// Those of a run at time 0, or at the checkpoint to go on from, and the place of its checkpoints, if it
     /// has one.
     pub fn open(

@@ -1,7 +1,5 @@
 //! The simulation that a case is.
 
-use gluey_geom::{Dim, Space};
-
 use crate::case::Case;
 use crate::simulation::{Simulation, Sliding};
 use gluey_contact::ContactModel;
@@ -13,7 +11,6 @@ pub(super) fn simulation<const D: usize, H, C>(
     contact: C,
 ) -> Simulation<D, H, C>
 where
-    Dim<D>: Space<D>,
     H: gluey_motion::Hydrodynamics<D>,
     C: ContactModel<D>,
 {

@@ -3,7 +3,7 @@
 use std::f64::consts::PI;
 
 use gluey_contact::ContactError;
-use gluey_geom::{Dim, Particle, Space};
+use gluey_geom::Particle;
 use gluey_motion::MeanStress;
 
 use super::contacts::Surrounded;
@@ -20,10 +20,7 @@ pub(super) fn with_contacts<const D: usize>(
     stress: MeanStress<D>,
     contact: &impl Surrounded<D>,
     particles: &[Particle<D>],
-) -> Result<MeanStress<D>, ContactError>
-where
-    Dim<D>: Space<D>,
-{
+) -> Result<MeanStress<D>, ContactError> {
     if D == 2 {
         return Ok(MeanStress { of_contacts: None, ..stress });
     }

@@ -3,7 +3,6 @@
 
 use std::path::{Path, PathBuf};
 
-use gluey_geom::{Dim, Space};
 use gluey_motion::Hydrodynamics;
 
 use super::contacts::Surrounded;
@@ -57,10 +56,7 @@ fn paths(case: &Case, csv: &Path) -> [Option<PathBuf>; 2] {
 
 impl RunTables {
     /// Starts those that a case has.
-    pub fn create<const D: usize>(case: &Case, csv: &Path) -> Result<Self, RowsError>
-    where
-        Dim<D>: Space<D>,
-    {
+    pub fn create<const D: usize>(case: &Case, csv: &Path) -> Result<Self, RowsError> {
         let create = |path: Option<PathBuf>, header: String| {
             path.map(|path| Draft::with_header(&path, &header)).transpose()
         };
@@ -80,10 +76,7 @@ impl RunTables {
         checkpoint: &Checkpoint<D>,
         particle_count: usize,
         visit: impl FnMut(&Instant<D>),
-    ) -> Result<Self, RowsError>
-    where
-        Dim<D>: Space<D>,
-    {
+    ) -> Result<Self, RowsError> {
         let TableMarks { trajectory, gaps, rheology, forces, solver } = &checkpoint.tables;
         let paths = ResultPaths::of_csv(csv);
         let resume = |path: PathBuf, mark: &Option<DraftMark>| {
@@ -105,7 +98,6 @@ impl RunTables {
         simulation: &Simulation<D, H, C>,
     ) -> Result<Option<f64>, RunError>
     where
-        Dim<D>: Space<D>,
         H: Hydrodynamics<D>,
         C: Surrounded<D>,
         HydrodynamicsError: From<H::Error>,

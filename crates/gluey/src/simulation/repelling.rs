@@ -1,23 +1,17 @@
 //! Repulsion in a simulation: forces on the particles where they are, and their stress.
 
 use gluey_contact::Domain;
-use gluey_geom::{Dim, Matrix, Particle, Space, Wrench};
+use gluey_geom::{Matrix, Particle, Wrench};
 use gluey_suspension::{Repelled, Repulsion};
 
 /// Particles that repel each other, and the walls.
 #[derive(Debug)]
-pub(super) struct Repelling<const D: usize>
-where
-    Dim<D>: Space<D>,
-{
+pub(super) struct Repelling<const D: usize> {
     law: Repulsion,
     surroundings: Domain<D>,
 }
 
-impl<const D: usize> Repelling<D>
-where
-    Dim<D>: Space<D>,
-{
+impl<const D: usize> Repelling<D> {
     /// Particles that repel each other by this law, and the walls of their surroundings.
     pub fn new(law: Repulsion, surroundings: Domain<D>) -> Self {
         Self { law, surroundings }

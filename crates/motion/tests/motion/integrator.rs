@@ -1,6 +1,6 @@
 //! Order, reversal, rotation and checkpoint of the integrators.
 
-use gluey_geom::{Dim, Matrix, Particle, Space, Twist, Vector, Wrench};
+use gluey_geom::{Dim, Matrix, Particle, Twist, Vector, Wrench};
 use gluey_motion::{BackgroundFlow, Configuration, Hydrodynamics, Integrator, LinearFlow, NoForces, Scheme};
 
 fn unit<const D: usize>(axis: usize) -> Vector<D> {
@@ -8,37 +8,29 @@ fn unit<const D: usize>(axis: usize) -> Vector<D> {
 }
 
 /// A particle off the centre of a rigidly turning flow, so that the exact answer is a circle.
-fn turning<const D: usize>() -> LinearFlow<D>
-where
-    Dim<D>: Space<D>,
-{
+fn turning<const D: usize>() -> LinearFlow<D> {
     let mut gradient = Matrix::<D>::zeros();
     (gradient[(0, 1)], gradient[(1, 0)]) = (-1.0, 1.0);
     LinearFlow { gradient, origin: Vector::zeros() }
 }
 
 /// Velocities in a multiple of the flow.
-fn twists<const D: usize>(flow: LinearFlow<D>, shear_factor: f64, particles: &[Particle<D>]) -> Vec<Twist<D>>
-where
-    Dim<D>: Space<D>,
-{
+fn twists<const D: usize>(
+    flow: LinearFlow<D>,
+    shear_factor: f64,
+    particles: &[Particle<D>],
+) -> Vec<Twist<D>> {
     let now = Configuration { shear_factor, ..Configuration::at(0.0, particles) };
     BackgroundFlow::new(flow).predict(&now).expect("no forces").twists
 }
 
 /// A step in a multiple of the turning flow.
-fn step<const D: usize>(factor: f64, integrator: &mut Integrator<D>, dt: f64, particles: &mut [Particle<D>])
-where
-    Dim<D>: Space<D>,
-{
+fn step<const D: usize>(factor: f64, integrator: &mut Integrator<D>, dt: f64, particles: &mut [Particle<D>]) {
     let twists = twists(turning(), factor, particles);
     integrator.advance(dt, particles, &twists);
 }
 
-fn quarter_turn_error<const D: usize>(scheme: Scheme, step_count: usize) -> f64
-where
-    Dim<D>: Space<D>,
-{
+fn quarter_turn_error<const D: usize>(scheme: Scheme, step_count: usize) -> f64 {
     let mut particles = [Particle::new(unit::<D>(0), 0.1)];
     let mut integrator = Integrator::new(scheme);
     let dt = std::f64::consts::FRAC_PI_2 / step_count as f64;
@@ -50,10 +42,7 @@ where
     (particles[0].pose.position - unit::<D>(1)).norm()
 }
 
-fn check_order<const D: usize>()
-where
-    Dim<D>: Space<D>,
-{
+fn check_order<const D: usize>() {
     for (scheme, order) in [(Scheme::Euler, 1.0), (Scheme::AdamsBashforth2, 2.0)] {
         let errors = [40, 80, 160, 320].map(|n| quarter_turn_error::<D>(scheme, n));
         for pair in errors.windows(2) {
@@ -155,10 +144,7 @@ fn schemes_have_names() {
     assert_eq!(names, ["euler", "adams-bashforth-2"]);
 }
 
-fn check_shear<const D: usize>()
-where
-    Dim<D>: Space<D>,
-{
+fn check_shear<const D: usize>() {
     let particles = [Particle::new(Vector::<D>::repeat(0.75), 0.1)];
     let twists = twists(LinearFlow::shear(2.0, 0.5), -1.0, &particles);
     assert_eq!(twists[0].velocity, unit::<D>(0) * -0.5);

@@ -35,7 +35,7 @@ fn the_exact_trajectory_is_followed() {
         let exact = Vector::<3>::new(row[3], row[4], 0.5);
         worst_gap = worst_gap.max((gap - row[1]).abs());
         worst_position = worst_position.max((particles[0].pose.position - exact).norm() / RADIUS);
-        worst_spin = worst_spin.max((there.twists[0].spin.z - row[7]).abs());
+        worst_spin = worst_spin.max((there.twists[0].spin[2] - row[7]).abs());
         for n in 0..substeps {
             let now = Configuration::at((steps + n) as f64 * dt, &particles);
             let predicted = flow.predict(&now).expect("a good pair");

@@ -18,7 +18,7 @@
 //! `1 + R / R_0`.
 
 use gluey_fem::Evaluator;
-use gluey_geom::{Dim, Matrix, Space, Vector, Wrench};
+use gluey_geom::{Dim, Matrix, Vector, Wrench};
 use gluey_linalg::{Jagged, Scalar, vector};
 use nalgebra::Matrix2;
 use rayon::prelude::*;
@@ -54,20 +54,14 @@ pub struct FilmCoupling<const D: usize> {
 
 /// Forces of a film on its two sides beyond what the mesh resolves.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct FilmForce<const D: usize>
-where
-    Dim<D>: Space<D>,
-{
+pub struct FilmForce<const D: usize> {
     /// The film.
     pub film: Film<D>,
     /// Forces and torques on the body and on its partner; none on a wall.
     pub wrenches: [Wrench<D>; 2],
 }
 
-impl<const D: usize> FilmForce<D>
-where
-    Dim<D>: Space<D>,
-{
+impl<const D: usize> FilmForce<D> {
     /// The same with other numbers of bodies.
     #[must_use]
     pub(crate) fn renumbered(self, number: impl Fn(u32) -> u32) -> Self {
@@ -83,10 +77,7 @@ where
     }
 }
 
-impl<const D: usize> FilmCoupling<D>
-where
-    Dim<D>: Space<D>,
-{
+impl<const D: usize> FilmCoupling<D> {
     /// Modes of a film: the normal one; sliding, rolling and the flow through it in each direction across it.
     pub const MODES: usize = 1 + 3 * (D - 1);
     /// Numbers that are kept of a film.
@@ -251,10 +242,7 @@ where
     }
 }
 
-impl<X: Scalar, T, const D: usize> Product<X, T> for FilmCoupling<D>
-where
-    Dim<D>: Space<D>,
-{
+impl<X: Scalar, T, const D: usize> Product<X, T> for FilmCoupling<D> {
     /// `(y, z) += (s B^T g, s B x - g)`.
     fn add(&self, [x, _, g]: [&[X]; 3], [y, _, z]: [&mut [X]; 3], _: &mut Scratch<T>) {
         let measure = |(row, (z, g)): (usize, (&mut X, &X))| {
@@ -267,10 +255,7 @@ where
     }
 }
 
-impl<const D: usize> Term<D> for FilmCoupling<D>
-where
-    Dim<D>: Space<D>,
-{
+impl<const D: usize> Term<D> for FilmCoupling<D> {
     fn row_count(&self) -> usize {
         self.dim()
     }
@@ -390,10 +375,7 @@ fn modes<const D: usize>(
 
 impl<const D: usize> Mode<D> {
     /// Its row in reduced velocities: those of the sides, then those of the nodes in the film.
-    fn row(&self, space: &VelocitySpace<D>, film: &Film<D>, flow: Option<&FilmFlow<D>>) -> Vec<(u32, f64)>
-    where
-        Dim<D>: Space<D>,
-    {
+    fn row(&self, space: &VelocitySpace<D>, film: &Film<D>, flow: Option<&FilmFlow<D>>) -> Vec<(u32, f64)> {
         let (t, n) = (&self.direction, &film.normal);
         let mut row = Vec::with_capacity(2 * Dim::<D>::RIGID);
         for (side, sign) in [1.0, -1.0].into_iter().enumerate() {

@@ -1,6 +1,6 @@
 //! What flows through a film, as velocities on the mesh have it.
 
-use gluey_geom::{Dim, Matrix, Space, Spin, Vector};
+use gluey_geom::{Dim, Matrix, Spin, Vector};
 
 /// The flow through a film between two bodies in one direction across it: a linear form of nodal velocities,
 /// and of the motions of the bodies.
@@ -25,10 +25,7 @@ pub struct FilmFlow<const D: usize> {
     pub turning: f64,
 }
 
-impl<const D: usize> FilmFlow<D>
-where
-    Dim<D>: Space<D>,
-{
+impl<const D: usize> FilmFlow<D> {
     /// The flow of a spin of one, per axis, about a point from which the middle of the film is at `arm`.
     pub fn of_spin(&self, arm: &Vector<D>) -> Spin<D> {
         let about_middle = (0..D).map(|d| {

@@ -17,7 +17,7 @@
 use std::ops::Range;
 use std::sync::Arc;
 
-use gluey_geom::{Dim, Space};
+use gluey_geom::Dim;
 use gluey_linalg::{
     DirectError, DirectSpd, Ordering, Preconditioner, RefinementParams, Scalar, SparseMatrix, Substitution,
     Symbolic, vector,
@@ -134,10 +134,7 @@ impl FilmNetwork {
         held: &[bool],
         all: &[FilmRow],
         own: Vec<FilmRow>,
-    ) -> Result<Option<Self>, DirectError>
-    where
-        Dim<D>: Space<D>,
-    {
+    ) -> Result<Option<Self>, DirectError> {
         if all.is_empty() {
             return Ok(None);
         }

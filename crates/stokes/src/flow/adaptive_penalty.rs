@@ -3,7 +3,6 @@
 
 use std::sync::Arc;
 
-use gluey_geom::{Dim, Space};
 use gluey_linalg::KrylovError;
 
 use super::conditions::Conditions;
@@ -16,20 +15,14 @@ use crate::formulation::{Method, Problem};
 pub const MOST_ROUNDS: usize = 6;
 
 /// A flow whose penalties are large enough, and the reduced vector it belongs to.
-pub(super) struct FlowWithAdaptedPenalty<const D: usize>
-where
-    Dim<D>: Space<D>,
-{
+pub(super) struct FlowWithAdaptedPenalty<const D: usize> {
     pub flow: Flow<D>,
     pub x: Vec<f64>,
     /// Whether the problem has got larger penalties for it.
     pub is_raised: bool,
 }
 
-impl<const D: usize> FlowSolver<D>
-where
-    Dim<D>: Space<D>,
-{
+impl<const D: usize> FlowSolver<D> {
     /// How penalties were changed since this was asked last.
     pub fn take_raised_penalties(&mut self) -> RaisedPenalties {
         std::mem::take(&mut self.raised_penalties)

@@ -8,7 +8,7 @@
 
 use std::sync::Arc;
 
-use gluey_geom::{Dim, Matrix, Space, Vector};
+use gluey_geom::{Matrix, Vector};
 use gluey_linalg::vector;
 
 use super::conditions::{Conditions, GivenOf};
@@ -16,10 +16,7 @@ use super::{Flow, FlowSolver};
 use crate::error::StokesError;
 use crate::formulation::{Method, Problem};
 
-impl<const D: usize> FlowSolver<D>
-where
-    Dim<D>: Space<D>,
-{
+impl<const D: usize> FlowSolver<D> {
     /// The flow with a uniform force so that nothing flows on the mean, for one without it. Whether penalties
     /// were raised on the way is told too.
     ///
@@ -68,10 +65,7 @@ where
 }
 
 /// Adds a multiple of a flow around the same bodies on the same mesh.
-fn add<const D: usize>(flow: &mut Flow<D>, factor: f64, other: &Flow<D>)
-where
-    Dim<D>: Space<D>,
-{
+fn add<const D: usize>(flow: &mut Flow<D>, factor: f64, other: &Flow<D>) {
     vector::axpy(factor, &other.velocity, &mut flow.velocity);
     vector::axpy(factor, &other.pressure, &mut flow.pressure);
     let twists = flow.twists.iter_mut().zip(&other.twists);

@@ -3,7 +3,7 @@
 //! A suspension that is sheared at a given stress: the stress is `r A + B` with the flow at the rate one, the
 //! flow of the forces between bodies, and the rate `r` that the stress asks for.
 
-use gluey_geom::{Dim, Space, Wrench};
+use gluey_geom::Wrench;
 use gluey_levelset::Ball;
 use gluey_linalg::vector;
 
@@ -12,10 +12,7 @@ use super::{FirstFlow, Flow, FlowSolver, SolveEffort, flow_of};
 use crate::error::StokesError;
 use crate::space::Discretisation;
 
-impl<const D: usize> FlowSolver<D>
-where
-    Dim<D>: Space<D>,
-{
+impl<const D: usize> FlowSolver<D> {
     /// The flow under some conditions, without forces on the bodies, plus a multiple of the flow that the
     /// `wrenches` make in a box at rest: `factor` tells the multiple from the two. Without wrenches there is
     /// one flow, and the factor is not asked for. All ranks call this.
@@ -53,10 +50,7 @@ where
 
 impl SolveEffort {
     /// That of two flows together, with the larger residual.
-    fn of<const D: usize>([first, second]: [&Flow<D>; 2]) -> Self
-    where
-        Dim<D>: Space<D>,
-    {
+    fn of<const D: usize>([first, second]: [&Flow<D>; 2]) -> Self {
         Self {
             solve_count: first.solve_count + second.solve_count,
             iteration_count: first.iteration_count + second.iteration_count,

@@ -1,6 +1,6 @@
 //! What drives a flow: boundary, forces, and of the bodies either wrenches or twists.
 
-use gluey_geom::{Dim, Matrix, Space, Twist, Vector, Wrench};
+use gluey_geom::{Matrix, Twist, Vector, Wrench};
 
 use crate::error::StokesError;
 use crate::formulation::Problem;
@@ -14,10 +14,7 @@ pub type Field<'a, const D: usize> = &'a dyn Fn(&Vector<D>) -> Vector<D>;
 /// holds them); the fluid exerts the opposite. They come on top of what `force` exerts on the bodies: on the
 /// nodes inside in `paper`, on the body as the mesh sees it in `unfitted`.
 #[derive(Clone, Copy)]
-pub struct Conditions<'a, const D: usize>
-where
-    Dim<D>: Space<D>,
-{
+pub struct Conditions<'a, const D: usize> {
     /// Velocity on the outer boundary. The same function, which must be divergence-free, is the undisturbed
     /// flow inside.
     pub boundary: Field<'a, D>,
@@ -37,10 +34,7 @@ where
 /// Wrenches or motions that are known of the bodies, one entry each in their order; the other follows from
 /// the flow.
 #[derive(Clone, Copy, Debug)]
-pub enum Given<'a, const D: usize>
-where
-    Dim<D>: Space<D>,
-{
+pub enum Given<'a, const D: usize> {
     /// Forces and torques on free bodies: the mobility problem. No entries: none on any of them.
     Wrenches(&'a [Wrench<D>]),
     /// Velocities and spins of held bodies: the resistance problem.
@@ -51,20 +45,14 @@ where
 
 /// A wrench or a motion that is known of one body.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum GivenOf<const D: usize>
-where
-    Dim<D>: Space<D>,
-{
+pub enum GivenOf<const D: usize> {
     /// Force and torque on it: it is free.
     Wrench(Wrench<D>),
     /// Its velocity and spin: it is held.
     Twist(Twist<D>),
 }
 
-impl<const D: usize> GivenOf<D>
-where
-    Dim<D>: Space<D>,
-{
+impl<const D: usize> GivenOf<D> {
     /// A body that is held at rest, or free without forces.
     pub fn at_rest(is_held: bool) -> Self {
         if is_held { Self::Twist(Twist::default()) } else { Self::Wrench(Wrench::default()) }
@@ -87,10 +75,7 @@ where
     }
 }
 
-impl<'a, const D: usize> Conditions<'a, D>
-where
-    Dim<D>: Space<D>,
-{
+impl<'a, const D: usize> Conditions<'a, D> {
     /// Free bodies without forces in a flow with this velocity on the boundary.
     pub fn boundary(boundary: Field<'a, D>) -> Self {
         Self {

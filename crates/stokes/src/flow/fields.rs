@@ -2,7 +2,7 @@
 
 use gluey_fem::element::value;
 use gluey_fem::{CellPoint, points_of_cells};
-use gluey_geom::{Dim, Space, Vector};
+use gluey_geom::Vector;
 use gluey_levelset::{Ball, BallTree};
 #[cfg(feature = "paper")]
 use gluey_levelset::{Ramp, ViscosityLaw};
@@ -11,10 +11,7 @@ use gluey_motion::{Fields, FlowStatistics};
 use super::{Flow, FlowParams, PhaseTimes, RaisedPenalties};
 use crate::formulation::Formulation;
 
-impl<const D: usize> Flow<D>
-where
-    Dim<D>: Space<D>,
-{
+impl<const D: usize> Flow<D> {
     /// Velocity, pressure, viscosity, level set and multiplier at the nodes of the own cells, of a flow with
     /// these parameters around these bodies. Where the box is periodic, the nodes of its far faces become
     /// points of their own. Cells of all ranks, in their order, are those of one process, each once; points
@@ -50,9 +47,7 @@ fn push_point<const D: usize>(
     balls: &BallTree<'_, D>,
     params: &FlowParams,
     at: &CellPoint<D>,
-) where
-    Dim<D>: Space<D>,
-{
+) {
     let &CellPoint { cell, node, x, ref local } = at;
     let at_node = |field: &[f64]| match field.is_empty() {
         true => Vector::zeros(),
@@ -69,10 +64,7 @@ fn push_point<const D: usize>(
     fields.viscosity.push(viscosity(flow, params, alpha));
 }
 
-fn viscosity<const D: usize>(flow: &Flow<D>, params: &FlowParams, alpha: f64) -> f64
-where
-    Dim<D>: Space<D>,
-{
+fn viscosity<const D: usize>(flow: &Flow<D>, params: &FlowParams, alpha: f64) -> f64 {
     match params.formulation {
         Formulation::Unfitted { .. } => params.viscosity,
         #[cfg(feature = "paper")]

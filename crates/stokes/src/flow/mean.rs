@@ -3,7 +3,7 @@
 use gluey_fem::NodeMap;
 use gluey_fem::cut::POINTS;
 use gluey_fem::element::{gauss_cube, multi_index, node_count, value};
-use gluey_geom::{Dim, Space, Vector};
+use gluey_geom::Vector;
 use rayon::prelude::*;
 
 use crate::error::StokesError;
@@ -17,10 +17,7 @@ pub fn mean_velocity<const D: usize>(
     problem: &Problem<D>,
     surfaces: &SurfaceCoupling<D>,
     velocity: &[f64],
-) -> Result<Vector<D>, StokesError>
-where
-    Dim<D>: Space<D>,
-{
+) -> Result<Vector<D>, StokesError> {
     let discretisation = problem.discretisation();
     let weights = fluid_weights(discretisation, &discretisation.velocity, &surfaces.cut);
     let mut sum = Vector::<D>::zeros();
@@ -49,9 +46,7 @@ pub fn subtract<const D: usize>(
     velocity: &mut [f64],
     by: &Vector<D>,
     moved: impl Fn(usize) -> bool,
-) where
-    Dim<D>: Space<D>,
-{
+) {
     let (nodal, _) = velocity.split_at_mut(space.full_dim());
     for (_, u) in nodal.chunks_exact_mut(D).enumerate().filter(|(node, _)| moved(*node)) {
         (0..D).for_each(|c| u[c] -= by[c]);

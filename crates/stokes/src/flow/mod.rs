@@ -17,7 +17,7 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use gluey_fem::TreeMesh;
-use gluey_geom::{Dim, Matrix, Space, Twist, Vector, Wrench};
+use gluey_geom::{Matrix, Twist, Vector, Wrench};
 use gluey_levelset::{Ball, Body};
 use gluey_parallel::Traffic;
 
@@ -67,10 +67,7 @@ impl FlowParams {
 
 /// A computed flow.
 #[derive(Clone, Debug)]
-pub struct Flow<const D: usize>
-where
-    Dim<D>: Space<D>,
-{
+pub struct Flow<const D: usize> {
     /// Mesh and nodes.
     pub discretisation: Discretisation<D>,
     /// Nodal velocities, `D` interleaved components; inside bodies see [`Flow::velocity_with_bodies`].
@@ -111,10 +108,7 @@ where
     pub times: PhaseTimes,
 }
 
-impl<const D: usize> Flow<D>
-where
-    Dim<D>: Space<D>,
-{
+impl<const D: usize> Flow<D> {
     /// The nodal velocities with the motion of the `bodies`, those of the flow, at all nodes inside these:
     /// for pictures. In `unfitted` [`Flow::velocity`] continues the fluid's polynomials there, which give the
     /// velocity of the fluid in the cells that surfaces cut.
@@ -131,10 +125,7 @@ where
 }
 
 /// A flow with its problem, for which the solver is prepared.
-struct FirstFlow<const D: usize>
-where
-    Dim<D>: Space<D>,
-{
+struct FirstFlow<const D: usize> {
     problem: Problem<D>,
     method: Arc<dyn Method<D>>,
     flow: Flow<D>,
@@ -144,10 +135,7 @@ where
 }
 
 /// Computes flows one after the other, keeping what can be reused.
-pub struct FlowSolver<const D: usize>
-where
-    Dim<D>: Space<D>,
-{
+pub struct FlowSolver<const D: usize> {
     params: FlowParams,
     /// For free bodies, and where any is held.
     solvers: [Box<dyn SaddleSolver<D> + Send>; 2],
@@ -179,10 +167,7 @@ impl SolveEffort {
     }
 }
 
-impl<const D: usize> FlowSolver<D>
-where
-    Dim<D>: Space<D>,
-{
+impl<const D: usize> FlowSolver<D> {
     /// A solver with the given parameters.
     ///
     /// # Errors
@@ -419,10 +404,7 @@ fn flow_of<const D: usize>(
     x: &mut [f64],
     multiplier: Vec<f64>,
     effort: &SolveEffort,
-) -> Result<Flow<D>, StokesError>
-where
-    Dim<D>: Space<D>,
-{
+) -> Result<Flow<D>, StokesError> {
     let mut pressure = problem.pressure_and_films(x);
     let mut velocity = problem.velocity(lift, x);
     let space = &problem.system.space;

@@ -10,7 +10,7 @@
 use std::sync::Arc;
 
 use gluey_fem::TreeMesh;
-use gluey_geom::{Dim, Matrix, Space, Spin, Twist, Vector, Wrench};
+use gluey_geom::{Dim, Matrix, Spin, Twist, Vector, Wrench};
 use gluey_levelset::Ball;
 use nalgebra::DMatrix;
 
@@ -23,10 +23,7 @@ use crate::formulation::{Method, Problem, symmetric_and_traceless};
 
 /// Bodies on a mesh with the linear solvers for them: as many flows as wanted, each from a guess of zero and
 /// none dependent on those before.
-pub struct Prepared<'s, const D: usize>
-where
-    Dim<D>: Space<D>,
-{
+pub struct Prepared<'s, const D: usize> {
     solver: Lent<'s, D>,
     problem: Problem<D>,
     /// The formulation, with penalties as the flows so far want them.
@@ -36,18 +33,12 @@ where
 }
 
 /// The solver of prepared flows: that of somebody else, or their own.
-enum Lent<'s, const D: usize>
-where
-    Dim<D>: Space<D>,
-{
+enum Lent<'s, const D: usize> {
     Borrowed(&'s mut FlowSolver<D>),
     Owned(Box<FlowSolver<D>>),
 }
 
-impl<const D: usize> Lent<'_, D>
-where
-    Dim<D>: Space<D>,
-{
+impl<const D: usize> Lent<'_, D> {
     fn get(&mut self) -> &mut FlowSolver<D> {
         match self {
             Self::Borrowed(solver) => solver,
@@ -56,10 +47,7 @@ where
     }
 }
 
-impl<const D: usize> FlowSolver<D>
-where
-    Dim<D>: Space<D>,
-{
+impl<const D: usize> FlowSolver<D> {
     /// Sets up several flows around `bodies` on `mesh`. The linear solver is prepared when it is first
     /// needed: once for free bodies and once for each choice of held ones.
     ///
@@ -109,10 +97,7 @@ where
     }
 }
 
-impl<const D: usize> Prepared<'_, D>
-where
-    Dim<D>: Space<D>,
-{
+impl<const D: usize> Prepared<'_, D> {
     /// The flow under some conditions, after a preparation of the linear solver at the first one with free
     /// and the first one with held bodies.
     ///
@@ -235,19 +220,13 @@ where
 type Screw<const D: usize> = (Vector<D>, Spin<D>);
 
 /// Sets number `k` of a screw of zeros to one.
-fn set_unit<const D: usize>(screw: &mut Screw<D>, k: usize)
-where
-    Dim<D>: Space<D>,
-{
+fn set_unit<const D: usize>(screw: &mut Screw<D>, k: usize) {
     match k.checked_sub(D) {
         Some(k) => screw.1[k] = 1.0,
         None => screw.0[k] = 1.0,
     }
 }
 
-fn spin_of<const D: usize>(spin: &Spin<D>) -> &[f64]
-where
-    Dim<D>: Space<D>,
-{
+fn spin_of<const D: usize>(spin: &Spin<D>) -> &[f64] {
     Dim::<D>::spin_slice(spin)
 }

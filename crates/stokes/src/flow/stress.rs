@@ -8,7 +8,7 @@
 //! the power that the flow dissipates, `<sigma>:E = Phi / V`, which is computed from the strains of the fluid
 //! and the forces of films: another route to the viscosity.
 
-use gluey_geom::{Dim, Matrix, Space};
+use gluey_geom::Matrix;
 use rayon::prelude::*;
 
 use super::mean::mean_pressure;
@@ -48,10 +48,7 @@ pub fn stress_of<const D: usize>(
     strain: &Matrix<D>,
     [velocity, pressure]: [&[f64]; 2],
     x: &[f64],
-) -> Result<Stress<D>, StokesError>
-where
-    Dim<D>: Space<D>,
-{
+) -> Result<Stress<D>, StokesError> {
     let (system, mesh) = (&problem.system, problem.discretisation());
     let Some(surfaces) = system.surfaces() else {
         return Err(StokesError::Unsupported { what: "stresses of suspensions" });
@@ -71,10 +68,7 @@ where
 }
 
 /// The first moments of the forces of films on each body.
-pub fn film_moments<const D: usize>(films: &[FilmForce<D>], body_count: usize) -> Vec<Matrix<D>>
-where
-    Dim<D>: Space<D>,
-{
+pub fn film_moments<const D: usize>(films: &[FilmForce<D>], body_count: usize) -> Vec<Matrix<D>> {
     let mut sums = vec![Matrix::zeros(); body_count];
     for force in films {
         for (side, body) in (0..2).filter_map(|side| Some((side, force.film.side(side)?))) {
@@ -91,10 +85,7 @@ fn dissipation<const D: usize>(
     cut: &CutCells<D>,
     velocity: &[f64],
     strain: &Matrix<D>,
-) -> f64
-where
-    Dim<D>: Space<D>,
-{
+) -> f64 {
     let energy = StrainEnergy::new(problem.discretisation(), cut);
     let of_cell = |cell: usize| match problem.discretisation().is_own(cell) {
         true => energy.in_cell(cell, velocity, strain),

@@ -9,7 +9,6 @@
 
 use gluey_fem::Evaluator;
 use gluey_fem::NodeMap;
-use gluey_geom::{Dim, Space};
 use gluey_linalg::vector;
 
 use crate::operator::StokesSystem;
@@ -31,10 +30,7 @@ pub struct NodalFields {
 
 impl NodalFields {
     /// Those of a reduced vector, with the pressures at their nodes.
-    pub(crate) fn of<const D: usize>(system: &StokesSystem<D>, x: &[f64], pressure: Vec<f64>) -> Self
-    where
-        Dim<D>: Space<D>,
-    {
+    pub(crate) fn of<const D: usize>(system: &StokesSystem<D>, x: &[f64], pressure: Vec<f64>) -> Self {
         let space = &system.space;
         let mut velocity = x[..space.dim()].to_vec();
         space.expand(&mut velocity);
@@ -64,19 +60,13 @@ pub struct WarmStartError {
 
 /// The last flow's deviation from the undisturbed one, and the one before.
 #[derive(Clone, Debug)]
-pub(crate) struct WarmStart<const D: usize>
-where
-    Dim<D>: Space<D>,
-{
+pub(crate) struct WarmStart<const D: usize> {
     discretisation: Discretisation<D>,
     last: NodalFields,
     before: Option<NodalFields>,
 }
 
-impl<const D: usize> WarmStart<D>
-where
-    Dim<D>: Space<D>,
-{
+impl<const D: usize> WarmStart<D> {
     /// From the deviation `last` on a mesh, and the one before it on the same mesh, if known.
     pub fn new(discretisation: Discretisation<D>, last: NodalFields, before: Option<NodalFields>) -> Self {
         Self { discretisation, last, before }
@@ -190,18 +180,14 @@ fn extrapolate(before: &[f64], last: &mut [f64]) {
 
 #[cfg(test)]
 mod tests {
-    use gluey_geom::{Aabb, Vector};
+    use gluey_geom::{Aabb, Dim, Vector};
     use gluey_levelset::Ball;
 
-    use super::*;
     use crate::{Conditions, FlowParams, FlowSolver, Refinement, SolverKind};
 
     /// A flow that is asked for again is its own guess: with the motions of the bodies, and the force of the
     /// film between them.
-    fn a_flow_is_its_own_guess<const D: usize>(level: u8)
-    where
-        Dim<D>: Space<D>,
-    {
+    fn a_flow_is_its_own_guess<const D: usize>(level: u8) {
         let at = |x: [f64; 3]| Ball::new(Vector::<D>::from_fn(|d, _| x[d]), 0.11);
         let bodies = [at([0.39, 0.53, 0.5]), at([0.61, 0.46, 0.51])];
         let params = FlowParams { solver: SolverKind::Multigrid, ..FlowParams::for_dimension(D) };

@@ -13,7 +13,6 @@ mod unfitted;
 use std::sync::Arc;
 
 use gluey_fem::TreeMesh;
-use gluey_geom::{Dim, Space};
 use gluey_levelset::Ball;
 
 use crate::dimension::in_dimension;
@@ -45,10 +44,7 @@ impl Formulation {
     ///
     /// # Errors
     /// [`StokesError::Parameter`] for a value out of range.
-    pub(crate) fn method<const D: usize>(&self) -> Result<Arc<dyn Method<D>>, StokesError>
-    where
-        Dim<D>: Space<D>,
-    {
+    pub(crate) fn method<const D: usize>(&self) -> Result<Arc<dyn Method<D>>, StokesError> {
         self.check()?;
         Ok(in_dimension(|| self.method_in_2d(), || self.method_in_3d()))
     }
@@ -61,10 +57,7 @@ impl Formulation {
         self.checked_method()
     }
 
-    fn checked_method<const D: usize>(&self) -> Arc<dyn Method<D>>
-    where
-        Dim<D>: Space<D>,
-    {
+    fn checked_method<const D: usize>(&self) -> Arc<dyn Method<D>> {
         match *self {
             #[cfg(feature = "paper")]
             Self::Paper(params) => Arc::new(paper::Paper::new(params)),
@@ -83,10 +76,7 @@ impl Formulation {
     }
 }
 
-impl<const D: usize> Problem<D>
-where
-    Dim<D>: Space<D>,
-{
+impl<const D: usize> Problem<D> {
     /// The problem on `mesh` around `bodies` in a fluid of the given viscosity.
     ///
     /// # Errors

@@ -7,7 +7,7 @@
 use std::fmt::Debug;
 use std::sync::Arc;
 
-use gluey_geom::{Dim, Matrix, Space, Twist, Vector, Wrench};
+use gluey_geom::{Dim, Matrix, Twist, Vector, Wrench};
 use gluey_levelset::{Ball, Body};
 use gluey_linalg::{parallel, vector};
 
@@ -22,10 +22,7 @@ use crate::surface::WeakCell;
 use crate::term::Load;
 
 /// A formulation with what it keeps from mesh to mesh.
-pub trait Method<const D: usize>: Send + Sync
-where
-    Dim<D>: Space<D>,
-{
+pub trait Method<const D: usize>: Send + Sync {
     /// The system around `bodies` on a mesh, and what belongs to it.
     ///
     /// # Errors
@@ -49,10 +46,7 @@ where
 }
 
 /// A formulation on one mesh, beside its system.
-pub trait Rigidity<const D: usize>: Debug + Send + Sync
-where
-    Dim<D>: Space<D>,
-{
+pub trait Rigidity<const D: usize>: Debug + Send + Sync {
     /// Velocity and spin of each body in a field that [`Problem::velocity`] gave.
     ///
     /// # Errors
@@ -152,10 +146,7 @@ pub type Multiplier = Vec<f64>;
 
 /// A flow around bodies on one mesh, ready to be solved.
 #[derive(Clone, Debug)]
-pub struct Problem<const D: usize>
-where
-    Dim<D>: Space<D>,
-{
+pub struct Problem<const D: usize> {
     /// The matrix, which knows mesh and nodes.
     pub system: StokesSystem<D>,
     /// The rigid bodies, on a part of a mesh those near it.
@@ -166,10 +157,7 @@ where
     pub(crate) rigidity: Arc<dyn Rigidity<D>>,
 }
 
-impl<const D: usize> Problem<D>
-where
-    Dim<D>: Space<D>,
-{
+impl<const D: usize> Problem<D> {
     /// The problem around all `bodies` on a mesh whose nodes are known, with what a formulation keeps from
     /// mesh to mesh. All ranks call this.
     ///
@@ -404,10 +392,7 @@ where
 }
 
 /// The rigid motion of a body that is closest to a flow at the ends of its diameters along the axes.
-fn motion_of<const D: usize>(flow: &dyn Fn(&Vector<D>) -> Vector<D>, body: &Ball<D>) -> Twist<D>
-where
-    Dim<D>: Space<D>,
-{
+fn motion_of<const D: usize>(flow: &dyn Fn(&Vector<D>) -> Vector<D>, body: &Ball<D>) -> Twist<D> {
     let mut twist = Twist::default();
     for k in 0..2 * D {
         let mut arm = Vector::<D>::zeros();

@@ -8,7 +8,7 @@
 use std::sync::Arc;
 
 use gluey_fem::TreeMesh;
-use gluey_geom::{Dim, Matrix, Space, Twist, Vector};
+use gluey_geom::{Matrix, Twist, Vector};
 use gluey_levelset::{Ball, Body};
 
 use super::problem::{FlowData, LinearSolve, Method, Multiplier, Problem, Rigidity, check_resolved};
@@ -65,10 +65,7 @@ impl Unfitted {
         discretisation: &Discretisation<D>,
         bodies: &[Ball<D>],
         viscosity: f64,
-    ) -> Result<StokesSystem<D>, StokesError>
-    where
-        Dim<D>: Space<D>,
-    {
+    ) -> Result<StokesSystem<D>, StokesError> {
         let heights = self.lubrication.heights::<D>(discretisation.finest_cell_size());
         let mut films = thin_films(bodies, discretisation.mesh.domain(), &heights);
         let flats = flats(&films, bodies.len(), &heights);
@@ -85,10 +82,7 @@ impl Unfitted {
     }
 }
 
-impl<const D: usize> Method<D> for Unfitted
-where
-    Dim<D>: Space<D>,
-{
+impl<const D: usize> Method<D> for Unfitted {
     fn discretised(
         &self,
         discretisation: &Discretisation<D>,
@@ -141,10 +135,7 @@ fn around<const D: usize>(
     flats: &Flats<D>,
     viscosity: f64,
     penalty: &PenaltyFactor,
-) -> Result<StokesSystem<D>, StokesError>
-where
-    Dim<D>: Space<D>,
-{
+) -> Result<StokesSystem<D>, StokesError> {
     check_resolved(discretisation, bodies, |_| true)?;
     let cut = CutCells::new(discretisation, bodies, flats);
     let aggregates = Aggregates::new(discretisation, &cut)?;
@@ -171,10 +162,7 @@ fn without_fluid<const D: usize>(discretisation: &Discretisation<D>, cut: &CutCe
     solid
 }
 
-impl<const D: usize> Rigidity<D> for Unfitted
-where
-    Dim<D>: Space<D>,
-{
+impl<const D: usize> Rigidity<D> for Unfitted {
     fn twists(&self, problem: &Problem<D>, velocity: &[f64]) -> Result<Vec<Twist<D>>, StokesError> {
         let space = &problem.system.space;
         Ok((0..space.body_count()).map(|body| space.twist(velocity, body)).collect())

@@ -8,7 +8,7 @@
 use std::sync::Arc;
 
 use gluey_fem::ReferenceMatrices;
-use gluey_geom::{Dim, Space};
+use gluey_geom::Dim;
 use gluey_linalg::{
     AffineConstraints, BlockGroups, BlockPattern, DirectSpd, Jagged, Ordering, RefinementParams, SparseError,
     SparseMatrix, Subset, Symbolic,
@@ -41,10 +41,7 @@ pub struct Assembled {
 
 /// Assembles the whole Stokes matrix `[A, -B^T; -B, 0]`. One pressure is left out, since pressures are
 /// defined up to a constant, and one node where velocities are.
-pub fn assemble_stokes<const D: usize>(system: &StokesSystem<D>) -> Result<Assembled, SparseError>
-where
-    Dim<D>: Space<D>,
-{
+pub fn assemble_stokes<const D: usize>(system: &StokesSystem<D>) -> Result<Assembled, SparseError> {
     let discretisation = system.discretisation();
     let split = system.velocity_dim();
     let pinned = (0..system.pressure.dim()).find(|&q| system.pressure.is_free(q));
@@ -67,20 +64,14 @@ where
 }
 
 /// Assembles the velocity block alone. Where nothing fixes a constant velocity, one node is left out.
-pub fn assemble_viscous<const D: usize>(system: &StokesSystem<D>) -> Result<Assembled, SparseError>
-where
-    Dim<D>: Space<D>,
-{
+pub fn assemble_viscous<const D: usize>(system: &StokesSystem<D>) -> Result<Assembled, SparseError> {
     let elements = Elements::new(system, ReferenceMatrices::<D>::VELOCITY);
     let loose = loose_node(&system.space);
     assemble_viscous_on(&elements, |node| Some(node) != loose)
 }
 
 /// A node that is left out where nothing fixes a constant velocity.
-fn loose_node<const D: usize>(space: &VelocitySpace<D>) -> Option<usize>
-where
-    Dim<D>: Space<D>,
-{
+fn loose_node<const D: usize>(space: &VelocitySpace<D>) -> Option<usize> {
     let first = || (0..space.nodes().node_count()).find(|&node| space.is_free(node));
     if space.is_anchored() { None } else { first() }
 }
@@ -90,10 +81,7 @@ where
 pub fn assemble_viscous_on<const D: usize>(
     elements: &Elements<'_, D>,
     keep: impl Fn(usize) -> bool,
-) -> Result<Assembled, SparseError>
-where
-    Dim<D>: Space<D>,
-{
+) -> Result<Assembled, SparseError> {
     let system = elements.system();
     let discretisation = system.discretisation();
     let nodal = system.space.full_dim();
@@ -107,10 +95,7 @@ where
     assemble(unknowns, forms, elements, &Jagged::default())
 }
 
-fn keeps_velocity<const D: usize>(space: &VelocitySpace<D>, k: usize) -> bool
-where
-    Dim<D>: Space<D>,
-{
+fn keeps_velocity<const D: usize>(space: &VelocitySpace<D>, k: usize) -> bool {
     match k.checked_sub(space.full_dim()) {
         Some(twist) => {
             let body = twist / Dim::<D>::RIGID;
@@ -127,10 +112,7 @@ fn assemble<const D: usize>(
     forms: impl Fn(usize, &mut CellForms),
     elements: &Elements<'_, D>,
     rows: &Jagged<(u32, f64)>,
-) -> Result<Assembled, SparseError>
-where
-    Dim<D>: Space<D>,
-{
+) -> Result<Assembled, SparseError> {
     let system = elements.system();
     let numbering = KeptBlocks::new(system, &unknowns);
     let (mut local, mut groups) = (CellForms::default(), BlockGroups::default());
@@ -175,10 +157,7 @@ where
 }
 
 /// The rows of terms in the kept unknowns, each ending with the force itself.
-fn rows_of_terms<const D: usize>(system: &StokesSystem<D>, unknowns: &Subset) -> Jagged<(u32, f64)>
-where
-    Dim<D>: Space<D>,
-{
+fn rows_of_terms<const D: usize>(system: &StokesSystem<D>, unknowns: &Subset) -> Jagged<(u32, f64)> {
     let mut rows = Jagged::default();
     let forces = system.dim() - system.row_count()..;
     for (row, force) in system.rows().zip(forces).filter_map(|(row, k)| Some((row, unknowns.number(k)?))) {
@@ -210,10 +189,7 @@ struct KeptBlocks {
 }
 
 impl KeptBlocks {
-    fn new<const D: usize>(system: &StokesSystem<D>, unknowns: &Subset) -> Self
-    where
-        Dim<D>: Space<D>,
-    {
+    fn new<const D: usize>(system: &StokesSystem<D>, unknowns: &Subset) -> Self {
         let (nodal, split) = (system.space.full_dim(), system.velocity_dim());
         let starts_block = |k: usize| match k {
             k if k < nodal => k % D == 0,
@@ -252,10 +228,7 @@ impl CellForms {
     }
 
     /// Adds the twist of a body to the forms of a cell, whose pressures count as zero if they have none.
-    fn extend_by_twist<const D: usize>(&mut self, system: &StokesSystem<D>, unknowns: &Subset, body: usize)
-    where
-        Dim<D>: Space<D>,
-    {
+    fn extend_by_twist<const D: usize>(&mut self, system: &StokesSystem<D>, unknowns: &Subset, body: usize) {
         let nodal = ReferenceMatrices::<D>::VELOCITY + ReferenceMatrices::<D>::PRESSURE;
         while self.forms.len() < nodal {
             self.push(&[]);
@@ -358,10 +331,7 @@ mod tests {
         }
     }
 
-    impl<const D: usize> Term<D> for Tie
-    where
-        Dim<D>: Space<D>,
-    {
+    impl<const D: usize> Term<D> for Tie {
         fn row_count(&self) -> usize {
             1
         }
@@ -372,10 +342,7 @@ mod tests {
     }
 
     /// Two bodies whose cells touch, on a mesh with hanging nodes, and a term of which no other code knows.
-    fn assembled_and_matrix_free_agree<const D: usize>()
-    where
-        Dim<D>: Space<D>,
-    {
+    fn assembled_and_matrix_free_agree<const D: usize>() {
         let balls = [0.32, 0.6].map(|x| Ball::new(Vector::<D>::repeat(x), 0.14 * (D as f64).sqrt()));
         let mesh = TreeMesh::<D>::refine(Aabb::unit(), [1; D], [false; D], 4, |lower, h, level| {
             level < 3 || (0..D).all(|d| lower[d] < 0.5 && lower[d] + h > 0.1)

@@ -5,7 +5,6 @@ use std::fmt::Debug;
 
 use gluey_fem::ReferenceMatrices;
 use gluey_fem::cells::{CellData, CellOperator, CellScalar};
-use gluey_geom::{Dim, Space};
 use gluey_linalg::{BlockError, Jagged, parallel};
 
 use crate::space::{ActiveCell, Discretisation, VelocitySpace};
@@ -59,10 +58,7 @@ impl CellViscosities {
 pub fn viscous_diagonal<'a, const D: usize>(
     discretisation: &Discretisation<D>,
     cells: impl Iterator<Item = (&'a ActiveCell, f64, Option<&'a [f64]>)>,
-) -> Vec<f64>
-where
-    Dim<D>: Space<D>,
-{
+) -> Vec<f64> {
     let nodes = &discretisation.velocity;
     let viscous = discretisation.reference().viscous;
     let n = ReferenceMatrices::<D>::VELOCITY;
@@ -83,10 +79,7 @@ pub fn cell_operator<T: CellScalar, const D: usize>(
     space: &VelocitySpace<D>,
     cells: &[ActiveCell],
     added: Option<&dyn AddedViscosity<D>>,
-) -> CellOperator<T, D>
-where
-    Dim<D>: Space<D>,
-{
+) -> CellOperator<T, D> {
     let discretisation = space.discretisation();
     let added = added.map(|added| added.values(discretisation.mesh.cell_count()));
     let data = cells.iter().map(|c| {

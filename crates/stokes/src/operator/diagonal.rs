@@ -1,7 +1,7 @@
 //! The inverse of the operator's diagonal, with a block for every body's twist.
 
 use gluey_fem::ReferenceMatrices;
-use gluey_geom::{Dim, Space};
+use gluey_geom::Dim;
 use gluey_linalg::{Preconditioner, invert_spd, vector};
 
 use super::cells::viscous_diagonal;
@@ -70,10 +70,7 @@ pub struct DiagonalSums {
 
 impl DiagonalSums {
     /// The sums over some cells.
-    pub fn new<const D: usize>(space: &VelocitySpace<D>, cells: &[ActiveCell]) -> Self
-    where
-        Dim<D>: Space<D>,
-    {
+    pub fn new<const D: usize>(space: &VelocitySpace<D>, cells: &[ActiveCell]) -> Self {
         let twists = twist_blocks(space, cells, &space.discretisation().reference());
         Self { nodal: nodal_sums(space, cells), twists }
     }
@@ -87,10 +84,7 @@ impl DiagonalSums {
         self,
         space: &VelocitySpace<D>,
         smoothed: &[bool],
-    ) -> Result<BlockDiagonal, DiagonalError>
-    where
-        Dim<D>: Space<D>,
-    {
+    ) -> Result<BlockDiagonal, DiagonalError> {
         let Self { mut nodal, mut twists } = self;
         nodal.resize(space.dim(), 0.0);
         space.halo().clone().sum(&mut nodal);
@@ -116,18 +110,12 @@ pub fn nodal_diagonal<const D: usize>(
     space: &VelocitySpace<D>,
     cells: &[ActiveCell],
     smoothed: &[bool],
-) -> Result<Vec<f32>, DiagonalError>
-where
-    Dim<D>: Space<D>,
-{
+) -> Result<Vec<f32>, DiagonalError> {
     inverse_entries(space, nodal_sums(space, cells), smoothed)
 }
 
 /// The diagonal at nodes.
-fn nodal_sums<const D: usize>(space: &VelocitySpace<D>, cells: &[ActiveCell]) -> Vec<f64>
-where
-    Dim<D>: Space<D>,
-{
+fn nodal_sums<const D: usize>(space: &VelocitySpace<D>, cells: &[ActiveCell]) -> Vec<f64> {
     let cells = cells.iter().map(|c| (c, c.viscous, None));
     let mut nodal = viscous_diagonal(space.discretisation(), cells);
     // The squares keep the sum positive: weights of hanging nodes may be negative.
@@ -140,10 +128,7 @@ fn inverse_entries<const D: usize>(
     space: &VelocitySpace<D>,
     nodal: Vec<f64>,
     smoothed: &[bool],
-) -> Result<Vec<f32>, DiagonalError>
-where
-    Dim<D>: Space<D>,
-{
+) -> Result<Vec<f32>, DiagonalError> {
     let mut nodal: Vec<f32> = nodal.into_iter().map(|d| d as f32).collect();
     for (k, value) in nodal.iter_mut().enumerate() {
         *value = match space.is_free(k / D) && smoothed[k / D] {
@@ -160,10 +145,7 @@ fn twist_blocks<const D: usize>(
     space: &VelocitySpace<D>,
     cells: &[ActiveCell],
     reference: &ReferenceMatrices<D>,
-) -> Vec<f64>
-where
-    Dim<D>: Space<D>,
-{
+) -> Vec<f64> {
     let discretisation = space.discretisation();
     let (n, rigid) = (ReferenceMatrices::<D>::VELOCITY, Dim::<D>::RIGID);
     let mut rows = vec![None; space.nodes().node_count()];

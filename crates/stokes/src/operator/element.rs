@@ -1,7 +1,6 @@
 //! Element matrices of the Stokes system: the viscous one, or the whole saddle.
 
 use gluey_fem::ReferenceMatrices;
-use gluey_geom::{Dim, Space};
 
 use super::system::StokesSystem;
 use crate::space::ActiveCell;
@@ -50,10 +49,7 @@ impl MatrixSource {
 }
 
 /// The matrices of the active cells.
-pub struct Elements<'a, const D: usize>
-where
-    Dim<D>: Space<D>,
-{
+pub struct Elements<'a, const D: usize> {
     system: &'a StokesSystem<D>,
     reference: ReferenceMatrices<D>,
     size: usize,
@@ -63,10 +59,7 @@ where
     own: Vec<Option<Box<[f64]>>>,
 }
 
-impl<'a, const D: usize> Elements<'a, D>
-where
-    Dim<D>: Space<D>,
-{
+impl<'a, const D: usize> Elements<'a, D> {
     /// Matrices of `size` rows: velocities only, or velocities and pressures.
     pub fn new(system: &'a StokesSystem<D>, size: usize) -> Self {
         let discretisation = system.discretisation();

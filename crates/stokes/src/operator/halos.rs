@@ -1,7 +1,7 @@
 //! The halos of the vectors of a system that ranks share.
 
 use gluey_fem::Constraint;
-use gluey_geom::{Dim, Space};
+use gluey_geom::Dim;
 use gluey_parallel::{GhostPlan, Halo};
 
 use crate::space::{PartNodes, Partition, PressureSpace, VelocitySpace};
@@ -28,10 +28,7 @@ impl SystemHalos {
         pressure: &PressureSpace<D>,
         terms: &Terms<D>,
         partition: &Partition<D>,
-    ) -> (Self, Halo)
-    where
-        Dim<D>: Space<D>,
-    {
+    ) -> (Self, Halo) {
         let (ranks, n) = (&partition.ranks, Dim::<D>::RIGID);
         let masters = CellMasters::new(space, &partition.velocity);
         let plan_of =
@@ -67,10 +64,7 @@ impl SystemHalos {
 
 /// The plan of the unknown pressures of other ranks on which own cells depend, by themselves or by those that
 /// follow from them.
-fn pressure_plan<const D: usize>(partition: &Partition<D>, pressure: &PressureSpace<D>) -> GhostPlan
-where
-    Dim<D>: Space<D>,
-{
+fn pressure_plan<const D: usize>(partition: &Partition<D>, pressure: &PressureSpace<D>) -> GhostPlan {
     let nodes = &partition.pressure;
     let mut needed = nodes.needed(partition.part.own());
     let rows = pressure.constraints().iter().filter(|row| !nodes.map.is_hanging(row.node as usize));
@@ -88,10 +82,7 @@ struct CellMasters<'p, const D: usize> {
     ghost_of: Vec<u32>,
 }
 
-impl<'p, const D: usize> CellMasters<'p, D>
-where
-    Dim<D>: Space<D>,
-{
+impl<'p, const D: usize> CellMasters<'p, D> {
     fn new(space: &'p VelocitySpace<D>, nodes: &'p PartNodes<D>) -> Self {
         let ghosts = space.ghosts();
         let mut ghost_of = vec![u32::MAX; nodes.map.node_count()];
@@ -144,10 +135,7 @@ fn bodies_here<const D: usize>(
     space: &VelocitySpace<D>,
     terms: &Terms<D>,
     partition: &Partition<D>,
-) -> Vec<bool>
-where
-    Dim<D>: Space<D>,
-{
+) -> Vec<bool> {
     let mut here = vec![false; space.body_count()];
     for (cell, body) in terms.iter().flat_map(|term| term.pieces()) {
         here[body] |= partition.part.own().contains(&cell);
@@ -167,9 +155,6 @@ where
 }
 
 /// Entries of the rows of terms.
-fn rows<const D: usize>(terms: &Terms<D>) -> impl Iterator<Item = &(u32, f64)>
-where
-    Dim<D>: Space<D>,
-{
+fn rows<const D: usize>(terms: &Terms<D>) -> impl Iterator<Item = &(u32, f64)> {
     terms.iter().flat_map(|term| (0..term.row_count()).flat_map(|row| term.row(row)))
 }

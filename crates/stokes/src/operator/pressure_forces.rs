@@ -1,7 +1,6 @@
 //! What pressures and the forces of terms do to velocities, in single precision.
 
 use gluey_fem::cells::{CellOperator, Workspace};
-use gluey_geom::{Dim, Space};
 use gluey_linalg::Scalar;
 
 use super::system::StokesSystem;
@@ -15,10 +14,7 @@ pub struct PressureForces<const D: usize> {
     scratch: Scratch<f32>,
 }
 
-impl<const D: usize> PressureForces<D>
-where
-    Dim<D>: Space<D>,
-{
+impl<const D: usize> PressureForces<D> {
     /// Those of a system.
     pub fn new(system: &StokesSystem<D>) -> Self {
         let (work, scratch) = (Workspace::default(), Scratch::default());

@@ -2,7 +2,6 @@
 //! `E^T A E`.
 
 use gluey_fem::cells::{CellOperator, CellScalar, Workspace};
-use gluey_geom::{Dim, Space};
 use gluey_linalg::{LinOp, Scalar};
 use gluey_parallel::{Halo, Number};
 use rayon::prelude::*;
@@ -28,10 +27,7 @@ pub struct CountedOperator<T, const D: usize> {
     applications: usize,
 }
 
-impl<T: CellScalar, const D: usize> CountedOperator<T, D>
-where
-    Dim<D>: Space<D>,
-{
+impl<T: CellScalar, const D: usize> CountedOperator<T, D> {
     /// The fluid's operator in these cells, of `cell_count` in all, on the velocities of `space`.
     pub fn new(space: &VelocitySpace<D>, cells: &[ActiveCell], cell_count: usize) -> Self {
         Self::with_viscosity(space, cells, cell_count, None)
@@ -76,10 +72,7 @@ where
 }
 
 /// On vectors that hold the same at ghosts as at their owners.
-impl<T: CellScalar + Number, const D: usize> LinOp<T> for CountedOperator<T, D>
-where
-    Dim<D>: Space<D>,
-{
+impl<T: CellScalar + Number, const D: usize> LinOp<T> for CountedOperator<T, D> {
     fn dim(&self) -> usize {
         self.dim
     }
@@ -112,10 +105,7 @@ pub fn acting<const D: usize>(
     cells.iter().filter(|c| acts[c.cell as usize]).copied().collect()
 }
 
-impl<T: CellScalar + Number, const D: usize> Restricted<T, D>
-where
-    Dim<D>: Space<D>,
-{
+impl<T: CellScalar + Number, const D: usize> Restricted<T, D> {
     /// The operator on the velocities at `positions`, from one of the cells that act on these.
     pub fn new(operator: CountedOperator<T, D>, positions: Vec<u32>) -> Self {
         let [velocity, load] = [(); 2].map(|()| vec![T::ZERO; operator.dim]);
@@ -141,10 +131,7 @@ where
     }
 }
 
-impl<T: CellScalar + Number, const D: usize> LinOp<T> for Restricted<T, D>
-where
-    Dim<D>: Space<D>,
-{
+impl<T: CellScalar + Number, const D: usize> LinOp<T> for Restricted<T, D> {
     fn dim(&self) -> usize {
         self.positions.len()
     }

@@ -8,7 +8,7 @@ use std::any::Any;
 use std::sync::Arc;
 
 use gluey_fem::cells::{CellOperator, Workspace};
-use gluey_geom::{Dim, Space};
+use gluey_geom::Dim;
 use gluey_linalg::{DirectError, LinOp, Scalar, vector};
 use gluey_parallel::{Communicator, Halo, Number};
 
@@ -40,10 +40,7 @@ pub struct StokesSystem<const D: usize> {
     halos: SystemHalos,
 }
 
-impl<const D: usize> StokesSystem<D>
-where
-    Dim<D>: Space<D>,
-{
+impl<const D: usize> StokesSystem<D> {
     /// The system with fluid viscosity `viscosity` on the velocities of `space`.
     pub fn new(space: VelocitySpace<D>, viscosity: f64) -> Self {
         Self::with_viscosity(space, viscosity, None)
@@ -277,10 +274,7 @@ where
 /// Stresses of cells are always computed in double precision: they are small differences of velocities, and
 /// their rounding errors cost iterations (`docs/archive/experiments/0010-krylov-vectors.md`).
 #[derive(Debug)]
-pub struct SystemOperator<'a, const D: usize>
-where
-    Dim<D>: Space<D>,
-{
+pub struct SystemOperator<'a, const D: usize> {
     system: &'a StokesSystem<D>,
     halo: Halo,
     wide: OperatorWork<f64>,
@@ -301,10 +295,7 @@ struct OperatorWork<X> {
     scratch: Scratch<f64>,
 }
 
-impl<'a, const D: usize> SystemOperator<'a, D>
-where
-    Dim<D>: Space<D>,
-{
+impl<'a, const D: usize> SystemOperator<'a, D> {
     /// The operator of `system`.
     pub fn new(system: &'a StokesSystem<D>) -> Self {
         Self {
@@ -336,7 +327,6 @@ impl<X: Scalar + Number> OperatorWork<X> {
 
     fn apply<const D: usize>(&mut self, system: &StokesSystem<D>, halo: &mut Halo, x: &[X], y: &mut [X])
     where
-        Dim<D>: Space<D>,
         dyn Term<D>: Product<X, f64>,
     {
         let Self { x: with_ghosts, pressure, cells, scratch } = self;
@@ -364,10 +354,7 @@ impl<X: Scalar + Number> OperatorWork<X> {
     }
 }
 
-impl<const D: usize> LinOp<f64> for SystemOperator<'_, D>
-where
-    Dim<D>: Space<D>,
-{
+impl<const D: usize> LinOp<f64> for SystemOperator<'_, D> {
     fn dim(&self) -> usize {
         self.system.dim()
     }
@@ -390,10 +377,7 @@ where
     }
 }
 
-impl<const D: usize> LinOp<f32> for SystemOperator<'_, D>
-where
-    Dim<D>: Space<D>,
-{
+impl<const D: usize> LinOp<f32> for SystemOperator<'_, D> {
     fn dim(&self) -> usize {
         self.system.dim()
     }
@@ -417,10 +401,7 @@ mod tests {
     use gluey_levelset::Ball;
 
     /// Constant pressures do no work on any admissible velocity.
-    fn constants_are_in_the_kernel<const D: usize>()
-    where
-        Dim<D>: Space<D>,
-    {
+    fn constants_are_in_the_kernel<const D: usize>() {
         let balls = [0.3, 0.62].map(|x| Ball::new(Vector::<D>::repeat(x), 0.14));
         let mesh = TreeMesh::<D>::refine(Aabb::unit(), [1; D], [false; D], 5, |lower, h, level| {
             level < 3 || (0..D).all(|d| lower[d] < 0.75 && lower[d] + h > 0.125)

@@ -1,6 +1,5 @@
 //! The velocity block of a system in single precision, all of it or around some of the nodes.
 
-use gluey_geom::{Dim, Space};
 use gluey_linalg::LinOp;
 
 use super::restricted::{CountedOperator, acting};
@@ -18,10 +17,7 @@ pub struct ViscousOperator<const D: usize> {
     scratch: Scratch<f32>,
 }
 
-impl<const D: usize> ViscousOperator<D>
-where
-    Dim<D>: Space<D>,
-{
+impl<const D: usize> ViscousOperator<D> {
     /// The velocity block of `system`: its loads on marked nodes, and all loads of velocities that vanish but
     /// at the nodes `near`.
     pub fn new(system: &StokesSystem<D>, marked: &[bool], near: &[bool]) -> Self {
@@ -54,10 +50,7 @@ where
     }
 }
 
-impl<const D: usize> LinOp<f32> for ViscousOperator<D>
-where
-    Dim<D>: Space<D>,
-{
+impl<const D: usize> LinOp<f32> for ViscousOperator<D> {
     fn dim(&self) -> usize {
         self.fluid.dim()
     }

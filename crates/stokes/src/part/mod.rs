@@ -9,7 +9,7 @@
 
 mod levels;
 
-use gluey_geom::{Aabb, Dim, Space};
+use gluey_geom::Aabb;
 use gluey_levelset::Ball;
 
 use crate::film::{Film, FilmCoupling, Lubrication, thin_films};
@@ -42,10 +42,7 @@ pub fn rings_around_surfaces<const D: usize>(
 }
 
 /// Numbers that [`NodalFields::films`] has for a film: a body, its partner (negative for walls), and vectors.
-pub fn numbers_of_film<const D: usize>() -> usize
-where
-    Dim<D>: Space<D>,
-{
+pub fn numbers_of_film<const D: usize>() -> usize {
     FilmCoupling::<D>::KEPT
 }
 

@@ -1,7 +1,6 @@
 //! The viscous matrix on numbered nodes.
 
 use gluey_fem::Constraint;
-use gluey_geom::{Dim, Space};
 use gluey_linalg::{BlockGroups, LocalTerm, Pattern, SparseError, SymmetricBlockMatrix};
 use rayon::prelude::*;
 
@@ -18,10 +17,7 @@ const LEAST_SHARE: usize = 8;
 pub fn assemble_on_nodes<const D: usize>(
     nodes: &NumberedNodes<'_, D>,
     elements: &Elements<'_, D>,
-) -> Result<SymmetricBlockMatrix<D>, SparseError>
-where
-    Dim<D>: Space<D>,
-{
+) -> Result<SymmetricBlockMatrix<D>, SparseError> {
     let (forms, mut terms) = (NodeForms::new(nodes, elements.system().space.ghosts()), Vec::new());
     let (mut sources, mut groups) = (Vec::new(), BlockGroups::default());
     for source in elements.sources() {
@@ -46,9 +42,7 @@ pub fn for_each_matrix<const D: usize>(
     elements: &Elements<'_, D>,
     sources: &[MatrixSource],
     mut visit: impl FnMut(MatrixSource, &[f64]),
-) where
-    Dim<D>: Space<D>,
-{
+) {
     let len = elements.size().pow(2);
     let mut dense = vec![0.0; BATCH.min(sources.len()) * len];
     for batch in sources.chunks(BATCH) {

@@ -1,6 +1,5 @@
 //! The block triangular preconditioner.
 
-use gluey_geom::{Dim, Space};
 use gluey_linalg::{Preconditioner, Scalar, vector};
 use gluey_parallel::Halo;
 
@@ -11,10 +10,7 @@ use crate::precondition::velocity::VCycle;
 
 /// `z_p = -S^-1 r_p`, `z_u = V (r_u + B^T z_p)`; the forces of terms join the pressures. Then the films' rows
 /// of motions are made to hold ([`FilmCorrection`]), so that no step opens them.
-pub struct BlockTriangular<'a, const D: usize>
-where
-    Dim<D>: Space<D>,
-{
+pub struct BlockTriangular<'a, const D: usize> {
     system: &'a StokesSystem<D>,
     forces: &'a mut PressureForces<D>,
     cycle: &'a mut VCycle<D>,
@@ -28,10 +24,7 @@ where
     halos: [Halo; 2],
 }
 
-impl<'a, const D: usize> BlockTriangular<'a, D>
-where
-    Dim<D>: Space<D>,
-{
+impl<'a, const D: usize> BlockTriangular<'a, D> {
     pub fn new(
         system: &'a StokesSystem<D>,
         forces: &'a mut PressureForces<D>,
@@ -53,10 +46,7 @@ where
     }
 }
 
-impl<S: Scalar, const D: usize> Preconditioner<S> for BlockTriangular<'_, D>
-where
-    Dim<D>: Space<D>,
-{
+impl<S: Scalar, const D: usize> Preconditioner<S> for BlockTriangular<'_, D> {
     fn apply(&mut self, r: &[S], z: &mut [S]) {
         let Self {
             system,

@@ -2,7 +2,6 @@
 
 use std::sync::Arc;
 
-use gluey_geom::{Dim, Space};
 use gluey_linalg::{
     DirectIndefinite, Gcr, GcrParams, IndefiniteParams, KrylovError, Ordering, Preconditioner, Reference,
     Subset, Symbolic,
@@ -55,10 +54,7 @@ impl DirectSolver {
     ///
     /// # Errors
     /// If it is singular.
-    pub fn factorise<const D: usize>(&mut self, system: &StokesSystem<D>) -> Result<(), StokesError>
-    where
-        Dim<D>: Space<D>,
-    {
+    pub fn factorise<const D: usize>(&mut self, system: &StokesSystem<D>) -> Result<(), StokesError> {
         let assembled = assemble_stokes(system)?;
         let pattern = assembled.matrix.pattern();
         let reusable = self.factor.take().filter(|f| f.symbolic().pattern() == pattern);
@@ -80,10 +76,7 @@ impl DirectSolver {
     }
 }
 
-impl<const D: usize> SaddleSolver<D> for DirectSolver
-where
-    Dim<D>: Space<D>,
-{
+impl<const D: usize> SaddleSolver<D> for DirectSolver {
     fn prepare(&mut self, problem: &Problem<D>) -> Result<(), StokesError> {
         self.factorise(&problem.system)
     }
@@ -123,10 +116,7 @@ where
 }
 
 /// The factorised matrix, inverted, between reduced vectors.
-struct Substitution<'a, const D: usize>
-where
-    Dim<D>: Space<D>,
-{
+struct Substitution<'a, const D: usize> {
     system: &'a StokesSystem<D>,
     unknowns: &'a Subset,
     factor: &'a mut DirectIndefinite,
@@ -134,10 +124,7 @@ where
     x: &'a mut [f64],
 }
 
-impl<const D: usize> Substitution<'_, D>
-where
-    Dim<D>: Space<D>,
-{
+impl<const D: usize> Substitution<'_, D> {
     /// Norm of the residual that rounding alone leaves.
     fn rounding_norm(&mut self, b: &[f64], x: &[f64]) -> f64 {
         self.unknowns.gather(b, self.b);
@@ -146,10 +133,7 @@ where
     }
 }
 
-impl<const D: usize> Preconditioner<f64> for Substitution<'_, D>
-where
-    Dim<D>: Space<D>,
-{
+impl<const D: usize> Preconditioner<f64> for Substitution<'_, D> {
     fn apply(&mut self, r: &[f64], z: &mut [f64]) {
         self.unknowns.gather(r, self.b);
         self.factor.apply(self.b, self.x);

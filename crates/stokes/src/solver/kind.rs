@@ -1,7 +1,5 @@
 //! The linear solvers by name.
 
-use gluey_geom::{Dim, Space};
-
 use super::SaddleSolver;
 use super::direct::DirectSolver;
 use super::multigrid::MultigridSolver;
@@ -18,10 +16,7 @@ pub enum SolverKind {
 
 impl SolverKind {
     /// A solver of this kind.
-    pub(crate) fn solver<const D: usize>(self) -> Box<dyn SaddleSolver<D> + Send>
-    where
-        Dim<D>: Space<D>,
-    {
+    pub(crate) fn solver<const D: usize>(self) -> Box<dyn SaddleSolver<D> + Send> {
         in_dimension(|| self.in_2d(), || self.in_3d())
     }
 

@@ -4,8 +4,6 @@ mod direct;
 mod kind;
 mod multigrid;
 
-use gluey_geom::{Dim, Space};
-
 use crate::error::StokesError;
 use crate::formulation::Problem;
 use crate::operator::StokesSystem;
@@ -31,10 +29,7 @@ pub struct SolveReport {
 }
 
 /// Solves `[A, -B^T; -B, 0] x = b` for reduced vectors of a [`StokesSystem`].
-pub trait SaddleSolver<const D: usize>
-where
-    Dim<D>: Space<D>,
-{
+pub trait SaddleSolver<const D: usize> {
     /// Builds what depends on the system: factors, levels, preconditioners.
     fn prepare(&mut self, problem: &Problem<D>) -> Result<(), StokesError>;
 

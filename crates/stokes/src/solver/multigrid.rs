@@ -9,7 +9,6 @@
 //! correction that the formulation has.
 
 use gluey_fem::ReferenceMatrices;
-use gluey_geom::{Dim, Space};
 use gluey_linalg::{Gcr, GcrParams, LinOp, Preconditioner, Reference, Scalar};
 
 use super::{SaddleSolver, SolveReport};
@@ -30,10 +29,7 @@ const MOST_NOISE: f64 = 1.0;
 
 /// Generalised conjugate residuals (GCR) with a block triangular preconditioner: one V-cycle of multigrid on
 /// the velocities, an approximate Schur complement on the pressures.
-pub struct MultigridSolver<const D: usize>
-where
-    Dim<D>: Space<D>,
-{
+pub struct MultigridSolver<const D: usize> {
     /// With steps in single and in double precision.
     single: Gcr<f64, f32>,
     double: Gcr<f64, f64, f32>,
@@ -47,10 +43,7 @@ where
     coarser: Vec<Discretisation<D>>,
 }
 
-impl<const D: usize> Default for MultigridSolver<D>
-where
-    Dim<D>: Space<D>,
-{
+impl<const D: usize> Default for MultigridSolver<D> {
     fn default() -> Self {
         let params = GcrParams { max_iterations: 200, restart: RESTART, ..GcrParams::default() };
         Self {
@@ -66,10 +59,7 @@ where
     }
 }
 
-impl<const D: usize> MultigridSolver<D>
-where
-    Dim<D>: Space<D>,
-{
+impl<const D: usize> MultigridSolver<D> {
     /// One V-cycle on the velocity block, for reduced velocities; `None` before the solver was prepared.
     pub fn velocity_cycle(&mut self) -> Option<&mut impl Preconditioner<f64>> {
         self.cycle.as_mut()
@@ -81,10 +71,7 @@ where
     }
 }
 
-impl<const D: usize> SaddleSolver<D> for MultigridSolver<D>
-where
-    Dim<D>: Space<D>,
-{
+impl<const D: usize> SaddleSolver<D> for MultigridSolver<D> {
     fn prepare(&mut self, problem: &Problem<D>) -> Result<(), StokesError> {
         let system = &problem.system;
         let elements = Elements::new(system, ReferenceMatrices::<D>::VELOCITY);
@@ -160,10 +147,7 @@ fn velocity_cycle<const D: usize>(
     problem: &Problem<D>,
     elements: &Elements<'_, D>,
     hierarchy: Hierarchy<D>,
-) -> Result<VCycle<D>, StokesError>
-where
-    Dim<D>: Space<D>,
-{
+) -> Result<VCycle<D>, StokesError> {
     let Problem { system, all_bodies, rigidity, .. } = problem;
     let levels = CycleLevels { meshes: &hierarchy.meshes, radius: problem.largest_radius() };
     let held = system.space.held_of_all();
@@ -206,10 +190,7 @@ fn run<S: Scalar>(
 
 /// Change of the viscous force when a velocity is rounded to single precision, over the force of a velocity
 /// as smooth as the box: a difference of neighbours, times the largest viscosity.
-fn rounding_noise<const D: usize>(system: &StokesSystem<D>) -> f64
-where
-    Dim<D>: Space<D>,
-{
+fn rounding_noise<const D: usize>(system: &StokesSystem<D>) -> f64 {
     let mesh = &system.discretisation().mesh;
     let contrast = system.added.as_ref().map_or(1.0, |added| added.contrast());
     let cells = mesh.domain().extent().max() / mesh.size(mesh.max_level());

@@ -1,6 +1,6 @@
 //! What belongs to bodies as numbers, for sums over ranks.
 
-use gluey_geom::{Dim, Matrix, Space, Spin, Twist, Vector, Wrench};
+use gluey_geom::{Dim, Matrix, Spin, Twist, Vector, Wrench};
 
 /// A quantity of a body in numbers of which ranks know how many there are.
 pub trait BodyNumbers {
@@ -14,10 +14,7 @@ pub trait BodyNumbers {
     fn read(numbers: &[f64]) -> Self;
 }
 
-impl<const D: usize> BodyNumbers for Twist<D>
-where
-    Dim<D>: Space<D>,
-{
+impl<const D: usize> BodyNumbers for Twist<D> {
     const COUNT: usize = Dim::<D>::RIGID;
 
     fn write(&self, numbers: &mut [f64]) {
@@ -30,10 +27,7 @@ where
     }
 }
 
-impl<const D: usize> BodyNumbers for Wrench<D>
-where
-    Dim<D>: Space<D>,
-{
+impl<const D: usize> BodyNumbers for Wrench<D> {
     const COUNT: usize = Dim::<D>::RIGID;
 
     fn write(&self, numbers: &mut [f64]) {
@@ -58,18 +52,12 @@ impl<const D: usize> BodyNumbers for Matrix<D> {
     }
 }
 
-fn write_pair<const D: usize>(vector: &Vector<D>, spin: &Spin<D>, numbers: &mut [f64])
-where
-    Dim<D>: Space<D>,
-{
+fn write_pair<const D: usize>(vector: &Vector<D>, spin: &Spin<D>, numbers: &mut [f64]) {
     numbers[..D].copy_from_slice(vector.as_slice());
     numbers[D..].copy_from_slice(Dim::<D>::spin_slice(spin));
 }
 
-fn read_pair<const D: usize>(numbers: &[f64]) -> (Vector<D>, Spin<D>)
-where
-    Dim<D>: Space<D>,
-{
+fn read_pair<const D: usize>(numbers: &[f64]) -> (Vector<D>, Spin<D>) {
     let mut spin = Dim::<D>::zero_spin();
     (0..Dim::<D>::ROT).for_each(|k| spin[k] = numbers[D + k]);
     (Vector::from_column_slice(&numbers[..D]), spin)

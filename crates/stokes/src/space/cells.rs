@@ -1,7 +1,5 @@
 //! The cells in which something flows.
 
-use gluey_geom::{Dim, Space};
-
 use super::discretisation::Discretisation;
 use super::marking::moves_as_one;
 use super::velocity::VelocitySpace;
@@ -20,10 +18,7 @@ pub struct ActiveCell {
 }
 
 /// The cells that are not rigid.
-pub fn active_cells<const D: usize>(space: &VelocitySpace<D>, viscosity: f64) -> Vec<ActiveCell>
-where
-    Dim<D>: Space<D>,
-{
+pub fn active_cells<const D: usize>(space: &VelocitySpace<D>, viscosity: f64) -> Vec<ActiveCell> {
     let discretisation = space.discretisation();
     let nodes = |cell: &ActiveCell| discretisation.velocity.cell(cell.cell as usize).iter();
     let mut cells = all_cells(discretisation, viscosity);

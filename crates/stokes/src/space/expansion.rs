@@ -1,17 +1,14 @@
 //! Nodal unknowns as linear forms in the reduced ones: one term for a free node, the masters of a hanging
 //! node, the entries of a body's twist for a rigid node, nothing on the boundary.
 
-use gluey_geom::{Dim, Space};
+use gluey_geom::Dim;
 use gluey_linalg::AffineConstraints;
 
 use super::pressure::PressureSpace;
 use super::velocity::VelocitySpace;
 
 /// Linear forms of the nodal velocities (`node * D + component`) in the positions of a reduced vector.
-pub fn velocity_expansion<const D: usize>(space: &VelocitySpace<D>) -> AffineConstraints
-where
-    Dim<D>: Space<D>,
-{
+pub fn velocity_expansion<const D: usize>(space: &VelocitySpace<D>) -> AffineConstraints {
     let nodes = space.nodes();
     let mut expansion = AffineConstraints::zeros(space.full_dim(), space.dim());
     for node in (0..nodes.node_count()).filter(|&n| space.is_free(n)) {
@@ -42,10 +39,7 @@ where
 }
 
 /// Linear forms of the pressure nodes in the free ones.
-pub fn pressure_expansion<const D: usize>(pressure: &PressureSpace<D>) -> AffineConstraints
-where
-    Dim<D>: Space<D>,
-{
+pub fn pressure_expansion<const D: usize>(pressure: &PressureSpace<D>) -> AffineConstraints {
     let mut expansion = AffineConstraints::zeros(pressure.dim(), pressure.dim());
     for q in (0..pressure.dim()).filter(|&q| pressure.is_free(q)) {
         expansion.set(q, [(q as u32, 1.0)]);

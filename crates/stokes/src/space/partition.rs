@@ -2,7 +2,7 @@
 //! those of others are.
 
 use gluey_fem::{Cell, Cuts, Part};
-use gluey_geom::{Dim, Space, Vector};
+use gluey_geom::{Dim, Vector};
 use gluey_parallel::{Communicator, GhostPlan, Halo, Ranks, Wanted};
 
 use super::part_nodes::PartNodes;
@@ -49,10 +49,7 @@ pub struct PartBodies {
     pub all: usize,
 }
 
-impl<const D: usize> Partition<D>
-where
-    Dim<D>: Space<D>,
-{
+impl<const D: usize> Partition<D> {
     /// The halos of reduced velocities, and of a square matrix for each twist: of the bodies with needed
     /// nodes, and of all with nodes in the part, for nodes that are `solid`. All ranks call this.
     pub fn halos(&self, solid: &[Option<u32>]) -> [Halo; 2] {

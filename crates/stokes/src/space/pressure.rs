@@ -3,7 +3,6 @@
 //! A pressure node that touches no cell in which something flows acts on nothing and is dropped.
 
 use gluey_fem::{Constraint, NodeMap};
-use gluey_geom::{Dim, Space};
 use gluey_linalg::Scalar;
 use gluey_parallel::Halo;
 
@@ -23,10 +22,7 @@ pub struct PressureSpace<const D: usize> {
     own: Option<Vec<bool>>,
 }
 
-impl<const D: usize> PressureSpace<D>
-where
-    Dim<D>: Space<D>,
-{
+impl<const D: usize> PressureSpace<D> {
     /// The pressures seen by the free velocities of `space` on the active `cells`.
     pub fn new(space: &VelocitySpace<D>, cells: &[ActiveCell]) -> Self {
         let discretisation = space.discretisation();

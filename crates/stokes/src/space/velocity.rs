@@ -11,7 +11,7 @@ mod twists;
 
 use gluey_fem::cells;
 use gluey_fem::{Constraint, NodeMap};
-use gluey_geom::{Dim, Space, Vector};
+use gluey_geom::{Dim, Vector};
 use gluey_levelset::Body;
 use gluey_linalg::Scalar;
 use gluey_parallel::Halo;
@@ -50,10 +50,7 @@ pub struct VelocitySpace<const D: usize> {
     halos: [Halo; 2],
 }
 
-impl<const D: usize> VelocitySpace<D>
-where
-    Dim<D>: Space<D>,
-{
+impl<const D: usize> VelocitySpace<D> {
     /// The space in which the nodes named in `solid` move with `bodies`. A body with too few nodes to define
     /// a rigid motion is left out: its nodes stay free, see [`VelocitySpace::is_active`]. On a part of a mesh
     /// all ranks call this, with the bodies near their parts.
@@ -353,18 +350,12 @@ mod tests {
     use gluey_geom::Aabb;
     use gluey_levelset::{Ball, nearest};
 
-    pub(super) fn space<const D: usize>() -> VelocitySpace<D>
-    where
-        Dim<D>: Space<D>,
-    {
+    pub(super) fn space<const D: usize>() -> VelocitySpace<D> {
         let (discretisation, balls, solid) = around_two_balls();
         VelocitySpace::new(&discretisation, &balls, &solid)
     }
 
-    fn around_two_balls<const D: usize>() -> (Discretisation<D>, [Ball<D>; 2], SolidNodes)
-    where
-        Dim<D>: Space<D>,
-    {
+    fn around_two_balls<const D: usize>() -> (Discretisation<D>, [Ball<D>; 2], SolidNodes) {
         let balls = [0.3, 0.7].map(|x| Ball::new(Vector::<D>::repeat(x), 0.2));
         let mesh = TreeMesh::<D>::refine(Aabb::unit(), [1; D], [false; D], 4, |lower, h, level| {
             level < 3 || (0..D).all(|d| lower[d] < 0.55 && lower[d] + h > 0.05)
@@ -379,10 +370,7 @@ mod tests {
     }
 
     /// A field that fulfils all constraints is that of the reduced vector it projects to, ghosts or not.
-    fn projection_keeps_admissible_fields<const D: usize>()
-    where
-        Dim<D>: Space<D>,
-    {
+    fn projection_keeps_admissible_fields<const D: usize>() {
         let (discretisation, balls, solid) = around_two_balls::<D>();
         let plain = space::<D>();
         let free: Vec<u32> =
@@ -405,10 +393,7 @@ mod tests {
         projection_keeps_admissible_fields::<3>();
     }
 
-    fn maps_are_adjoint<const D: usize>()
-    where
-        Dim<D>: Space<D>,
-    {
+    fn maps_are_adjoint<const D: usize>() {
         let space = space::<D>();
         assert!((0..2).all(|b| space.is_active(b)));
         let wave = |k: f64| (0..space.dim()).map(|i| (k * i as f64).sin()).collect::<Vec<f64>>();

@@ -4,7 +4,7 @@ use gluey_fem::Constraint;
 use gluey_fem::cells::{CellScalar, CutOperator, CutPiece};
 use gluey_fem::cut::{POINTS, ViscousMatrices, ViscousWeights};
 use gluey_fem::element::{gauss_cube, node_count, value};
-use gluey_geom::{Dim, Space, Twist, Vector};
+use gluey_geom::{Dim, Twist, Vector};
 use gluey_levelset::{Ball, Body};
 use gluey_linalg::{AffineConstraints, Jagged, Scalar, Subset};
 use rayon::prelude::*;
@@ -56,10 +56,7 @@ pub struct SurfaceCoupling<const D: usize> {
     pub(super) narrow: CutOperator<f32, D>,
 }
 
-impl<const D: usize> SurfaceCoupling<D>
-where
-    Dim<D>: Space<D>,
-{
+impl<const D: usize> SurfaceCoupling<D> {
     /// The operator around `bodies` in a fluid of this viscosity, with this multiple of the largest ratios as
     /// penalty.
     ///
@@ -317,10 +314,7 @@ fn forms(nodes: &Subset, ghosts: &[Constraint]) -> AffineConstraints {
 }
 
 /// The velocity at `arm` of a body of radius one that moves in unknown `k` of its twist.
-fn unit_motion<const D: usize>(k: usize, arm: &Vector<D>) -> Vector<D>
-where
-    Dim<D>: Space<D>,
-{
+fn unit_motion<const D: usize>(k: usize, arm: &Vector<D>) -> Vector<D> {
     let mut twist = Twist::<D>::default();
     match k.checked_sub(D) {
         Some(k) => twist.spin[k] = 1.0,
@@ -342,10 +336,7 @@ struct PieceData<'a, const D: usize> {
     pressures: Vec<Vec<u32>>,
 }
 
-impl<'a, const D: usize> PieceData<'a, D>
-where
-    Dim<D>: Space<D>,
-{
+impl<'a, const D: usize> PieceData<'a, D> {
     fn new(
         discretisation: &'a Discretisation<D>,
         bodies: &'a [Ball<D>],

@@ -2,7 +2,7 @@
 
 use gluey_fem::cut::POINTS;
 use gluey_fem::element::{gauss_cube, node_count};
-use gluey_geom::{Dim, Matrix, Space, Vector};
+use gluey_geom::{Matrix, Vector};
 
 use super::cut_cells::{CellState, CutCells};
 use super::shapes::slope;
@@ -22,10 +22,7 @@ pub struct StrainEnergy<'a, const D: usize> {
     fine: GaussRule<D>,
 }
 
-impl<'a, const D: usize> StrainEnergy<'a, D>
-where
-    Dim<D>: Space<D>,
-{
+impl<'a, const D: usize> StrainEnergy<'a, D> {
     /// Those in the fluid that bodies leave of a mesh.
     pub fn new(discretisation: &'a Discretisation<D>, cut: &'a CutCells<D>) -> Self {
         let shear = discretisation.mesh.shear();

@@ -12,7 +12,7 @@ use std::ops::{AddAssign, Mul};
 use gluey_fem::Constraint;
 use gluey_fem::cut::POINTS;
 use gluey_fem::element::{gauss, gauss_cube, gradient, node_count, value};
-use gluey_geom::{Dim, Matrix, Space, Vector};
+use gluey_geom::{Matrix, Vector};
 use gluey_levelset::{Ball, BallTree, Body};
 use rayon::prelude::*;
 
@@ -32,10 +32,7 @@ pub fn flows_through_films<const D: usize>(
     bodies: &[Ball<D>],
     films: &[Film<D>],
     heights: &Heights,
-) -> Vec<Vec<FilmFlow<D>>>
-where
-    Dim<D>: Space<D>,
-{
+) -> Vec<Vec<FilmFlow<D>>> {
     let smallest = space.discretisation().finest_cell_size();
     let regions: Vec<Region<D>> =
         films.iter().map(|film| Region::new(film, bodies, film.height(heights), smallest)).collect();
@@ -84,10 +81,7 @@ struct Region<const D: usize> {
     height: f64,
 }
 
-impl<const D: usize> Region<D>
-where
-    Dim<D>: Space<D>,
-{
+impl<const D: usize> Region<D> {
     fn new(film: &Film<D>, bodies: &[Ball<D>], height: f64, smallest: f64) -> Self {
         let shape = film.shape(height);
         // In 2D the potential grows over a cell more than its reach, and is to do so between the flats.
@@ -202,10 +196,7 @@ fn weight(square: f64) -> f64 {
     (1.0 - square).max(0.0).powi(2)
 }
 
-impl<const D: usize> FluidAround<'_, D>
-where
-    Dim<D>: Space<D>,
-{
+impl<const D: usize> FluidAround<'_, D> {
     /// Calls `visit` with the points of the rule in a cell, their places from the centre of a ball, and the
     /// volume of the fluid that belongs to them.
     fn for_each_point(
@@ -250,10 +241,7 @@ fn cells_in<const D: usize>(
     space: &VelocitySpace<D>,
     cut: &CutCells<D>,
     regions: &[Region<D>],
-) -> Vec<Vec<u32>>
-where
-    Dim<D>: Space<D>,
-{
+) -> Vec<Vec<u32>> {
     let discretisation = space.discretisation();
     let mesh = &discretisation.mesh;
     let around: Vec<Ball<D>> = regions.iter().map(|region| region.around).collect();
@@ -354,7 +342,7 @@ impl<'a> Followers<'a> {
 #[cfg(test)]
 mod tests {
     use gluey_fem::TreeMesh;
-    use gluey_geom::{Aabb, Twist};
+    use gluey_geom::{Aabb, Dim, Twist};
 
     use super::*;
     use crate::film::{FilmCoupling, Lubrication, thin_films};
@@ -363,10 +351,7 @@ mod tests {
     use crate::term::{Product, Scratch};
 
     /// Fluid and bodies that move as one lose nothing in films, whatever cells these cut.
-    fn moving_as_one_is_free<const D: usize>()
-    where
-        Dim<D>: Space<D>,
-    {
+    fn moving_as_one_is_free<const D: usize>() {
         let n = Vector::<D>::from_fn(|d, _| [0.7, -0.4, 0.5][d]).normalize();
         let (middle, radius) = (Vector::<D>::from_fn(|d, _| 0.5 + 0.01 * d as f64), 0.2);
         let bodies = [-1.0, 1.0].map(|side| Ball::new(middle + n * (side * (radius + 0.01)), radius));

@@ -5,7 +5,7 @@
 
 use gluey_fem::cut::POINTS;
 use gluey_fem::element::{gauss, gauss_cube, node_count, value};
-use gluey_geom::{Dim, Space, Vector, Wrench};
+use gluey_geom::{Dim, Vector, Wrench};
 
 use super::cut_cells::{CutCell, CutCells, in_space};
 use crate::space::Discretisation;
@@ -43,10 +43,7 @@ pub fn forces_on_bodies<const D: usize>(
     cut: &CutCells<D>,
     force: Force<'_, D>,
     body_count: usize,
-) -> Vec<Wrench<D>>
-where
-    Dim<D>: Space<D>,
-{
+) -> Vec<Wrench<D>> {
     let (points, ray) = (gauss_cube::<D>(POINTS), gauss(RAY_POINTS));
     let in_box = |x: Vector<D>| force(&wrapped(discretisation, x));
     let mut wrenches = vec![Wrench::default(); body_count];
@@ -80,10 +77,7 @@ fn along_ray<const D: usize>(
     rule: &[(f64, f64)],
     arm: &Vector<D>,
     force: impl Fn(Vector<D>) -> Vector<D>,
-) -> Wrench<D>
-where
-    Dim<D>: Space<D>,
-{
+) -> Wrench<D> {
     let mut sum = Wrench::default();
     for &(s, weight) in rule {
         let arm = arm * s;
@@ -117,10 +111,7 @@ mod tests {
 
     /// For `f = x_0^2 e_0 + w x r` the force is `|B| (c_0^2 + a^2 / (D + 2))`, the torque `|B| w a^2` times
     /// 1/2 in 2D and 2/5 in 3D.
-    fn integrals_over_bodies<const D: usize>(volume: f64, gyration: f64)
-    where
-        Dim<D>: Space<D>,
-    {
+    fn integrals_over_bodies<const D: usize>(volume: f64, gyration: f64) {
         let (radius, center) = (0.23, Vector::<D>::from_fn(|d, _| [0.47, 0.52, 0.55][d]));
         let mesh = TreeMesh::uniform(Aabb::unit(), [1; D], [false; D], 3).unwrap();
         let discretisation = Discretisation::new(mesh);

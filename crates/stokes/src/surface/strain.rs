@@ -10,7 +10,7 @@
 //! pressures and, by its reaction, on the bodies.
 
 use gluey_fem::element::node_count;
-use gluey_geom::{Dim, Matrix, Space, Vector, Wrench};
+use gluey_geom::{Dim, Matrix, Vector, Wrench};
 use gluey_linalg::vectorised;
 use rayon::prelude::*;
 
@@ -28,9 +28,7 @@ pub fn add_load_of_strain<const D: usize>(
     surfaces: &SurfaceCoupling<D>,
     strain: &Matrix<D>,
     load: &mut Load<D>,
-) where
-    Dim<D>: Space<D>,
-{
+) {
     let (discretisation, viscosity) = (surfaces.discretisation(), surfaces.viscosity);
     let rule = CellRule::<D>::new(discretisation.mesh.shear());
     let of_cell = |place: usize| {
@@ -60,10 +58,7 @@ pub fn add_load_of_strain<const D: usize>(
 }
 
 /// The loads of a cut cell, those of a viscosity of one.
-struct CellLoad<const D: usize>
-where
-    Dim<D>: Space<D>,
-{
+struct CellLoad<const D: usize> {
     /// By component and node.
     forces: [[f64; MOST_NODES]; D],
     pressures: Vec<f64>,
@@ -80,10 +75,7 @@ struct CellRule<const D: usize> {
     slopes: Vec<[[f64; MOST_NODES]; D]>,
 }
 
-impl<const D: usize> CellRule<D>
-where
-    Dim<D>: Space<D>,
-{
+impl<const D: usize> CellRule<D> {
     fn new(shear: f64) -> Self {
         let shapes = Shapes::<D>::new(shear);
         let mut values = vec![[0.0; MOST_NODES]; shapes.points.len()];

@@ -2,7 +2,7 @@
 
 use gluey_fem::ReferenceMatrices;
 use gluey_fem::cut::ViscousMatrices;
-use gluey_geom::{Dim, Matrix, Space};
+use gluey_geom::{Dim, Matrix};
 use gluey_linalg::Scalar;
 
 use super::coupling::SurfaceCoupling;
@@ -11,28 +11,19 @@ use super::load::{add_load_of_cut_cells, forces_on_bodies};
 use super::strain::add_load_of_strain;
 use crate::term::{Force, Load, PieceMatrices, Product, Scratch, Term, piece_size};
 
-impl<X: Scalar, const D: usize> Product<X, f64> for SurfaceCoupling<D>
-where
-    Dim<D>: Space<D>,
-{
+impl<X: Scalar, const D: usize> Product<X, f64> for SurfaceCoupling<D> {
     fn add(&self, [x, p, _]: [&[X]; 3], [y, q, _]: [&mut [X]; 3], scratch: &mut Scratch<f64>) {
         self.add_by(&self.wide, [x, p], [y, q], scratch);
     }
 }
 
-impl<const D: usize> Product<f32, f32> for SurfaceCoupling<D>
-where
-    Dim<D>: Space<D>,
-{
+impl<const D: usize> Product<f32, f32> for SurfaceCoupling<D> {
     fn add(&self, [x, p, _]: [&[f32]; 3], [y, q, _]: [&mut [f32]; 3], scratch: &mut Scratch<f32>) {
         self.add_by(&self.narrow, [x, p], [y, q], scratch);
     }
 }
 
-impl<const D: usize> Term<D> for SurfaceCoupling<D>
-where
-    Dim<D>: Space<D>,
-{
+impl<const D: usize> Term<D> for SurfaceCoupling<D> {
     fn covers(&self, cell: usize) -> bool {
         self.cut.states[cell] != CellState::Fluid
     }

@@ -1,6 +1,6 @@
 //! First moments of the tractions on the surfaces.
 
-use gluey_geom::{Dim, Matrix, Space, Vector};
+use gluey_geom::{Matrix, Vector};
 use gluey_levelset::{Ball, Body};
 use rayon::prelude::*;
 
@@ -50,10 +50,7 @@ pub fn first_moments<const D: usize>(
     viscosity: f64,
     [velocity, pressure]: [&[f64]; 2],
     undisturbed: &Matrix<D>,
-) -> Vec<Matrix<D>>
-where
-    Dim<D>: Space<D>,
-{
+) -> Vec<Matrix<D>> {
     let discretisation = space.discretisation();
     let shear = discretisation.mesh.shear();
     let shapes = Shapes::<D>::new(shear);

@@ -12,7 +12,7 @@
 //! cells took 0.7 to 2.2 of the energy around them and all others at most 0.15; in two flows in which nothing
 //! was wrong none took more than 0.3.
 
-use gluey_geom::{Dim, Matrix, Space};
+use gluey_geom::Matrix;
 use rayon::prelude::*;
 
 use super::coupling::SurfaceCoupling;
@@ -50,10 +50,7 @@ pub fn weak_cells<const D: usize>(
     surfaces: &SurfaceCoupling<D>,
     velocity: &[f64],
     strain: &Matrix<D>,
-) -> Vec<WeakCell>
-where
-    Dim<D>: Space<D>,
-{
+) -> Vec<WeakCell> {
     let (discretisation, cut) = (surfaces.discretisation(), &surfaces.cut);
     let energy = StrainEnergy::new(discretisation, cut);
     let mesh = &discretisation.mesh;

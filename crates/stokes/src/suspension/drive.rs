@@ -6,7 +6,7 @@
 //! strain, `u_1 + u_2 / r`, as at the rate one. Contacts scale with the flow; their stress is known after the
 //! step only and is no part of what is given.
 
-use gluey_geom::{Dim, Space, Vector, Wrench};
+use gluey_geom::{Vector, Wrench};
 use gluey_levelset::Ball;
 use gluey_motion::Configuration;
 
@@ -16,10 +16,7 @@ use crate::flow::{Conditions, Flow, FlowSolver, GivenOf, Stress};
 use crate::space::Discretisation;
 
 /// Conditions that drive the flow of a configuration.
-pub struct Drive<'a, const D: usize>
-where
-    Dim<D>: Space<D>,
-{
+pub struct Drive<'a, const D: usize> {
     /// All, but for [`Drive::pushes`].
     pub conditions: Conditions<'a, D>,
     /// Forces and torques whose flow at rest has a share in the stress that is given; elsewhere no entries.
@@ -51,10 +48,7 @@ pub struct NotDriven {
     pub at_rest: f64,
 }
 
-impl<const D: usize> Suspension<D>
-where
-    Dim<D>: Space<D>,
-{
+impl<const D: usize> Suspension<D> {
     /// Hands `solve` what drives the flow of a configuration in a fluid of this viscosity.
     ///
     /// In a box without walls the flow is relative to the undisturbed one. Where all particles are free
@@ -131,10 +125,7 @@ where
     }
 }
 
-impl<const D: usize> Drive<'_, D>
-where
-    Dim<D>: Space<D>,
-{
+impl<const D: usize> Drive<'_, D> {
     /// The shear rate over that by which velocities count, from the stresses of the flow under the conditions
     /// and of that which the pushes make at rest, if there are any. Positive also while the shear is
     /// reversed; one where no stress is given.
@@ -158,10 +149,7 @@ where
     }
 }
 
-impl<const D: usize> FlowSolver<D>
-where
-    Dim<D>: Space<D>,
-{
+impl<const D: usize> FlowSolver<D> {
     /// The flow that this drives, and [`Drive::rate`]. All ranks call this.
     ///
     /// # Errors

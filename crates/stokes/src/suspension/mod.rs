@@ -6,7 +6,7 @@ mod prediction;
 use std::borrow::Cow;
 
 use gluey_fem::{MeshError, TreeMesh};
-use gluey_geom::{Aabb, Dim, Lattice, Particle, Space, Twist, Vector, Wrench};
+use gluey_geom::{Aabb, Lattice, Particle, Twist, Vector, Wrench};
 use gluey_levelset::Ball;
 use gluey_motion::{Configuration, LinearFlow};
 
@@ -49,10 +49,7 @@ pub use drive::{Drive, NotDriven};
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 #[derive(Clone, Debug)]
-pub struct Suspension<const D: usize>
-where
-    Dim<D>: Space<D>,
-{
+pub struct Suspension<const D: usize> {
     /// The box.
     pub domain: Aabb<D>,
     /// Cells along its edges before any is refined.
@@ -79,10 +76,7 @@ where
     pub shear_stress: Option<f64>,
 }
 
-impl<const D: usize> Suspension<D>
-where
-    Dim<D>: Space<D>,
-{
+impl<const D: usize> Suspension<D> {
     /// Whether the box has no walls.
     pub fn is_sheared(&self) -> bool {
         self.periods.iter().all(Option::is_some)

@@ -1,16 +1,13 @@
 //! What a flow predicts of the particles of a configuration.
 
-use gluey_geom::{Dim, Matrix, Space, Twist, Vector};
+use gluey_geom::{Matrix, Twist, Vector};
 use gluey_motion::{Configuration, Fields, Film, Holding, MeanStress, PairKey, Prediction};
 
 use super::Suspension;
 use crate::film::{self, Lubrication, Partner};
 use crate::flow::Flow;
 
-impl<const D: usize> Suspension<D>
-where
-    Dim<D>: Space<D>,
-{
+impl<const D: usize> Suspension<D> {
     /// What a flow in a fluid of this viscosity predicts, with the rate that its [`super::Drive`] has; the
     /// statistics are left to the solver.
     pub fn prediction(

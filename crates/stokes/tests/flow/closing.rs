@@ -1,7 +1,7 @@
 //! How fast films close at the default tolerance, against solves that are converged: the speed is the smaller
 //! the thinner the film, and no part of the error may be judged by anything that grows as the film closes.
 
-use gluey_geom::{Aabb, Dim, Matrix, Space, Vector};
+use gluey_geom::{Aabb, Matrix, Vector};
 use gluey_levelset::Ball;
 use gluey_stokes::{Conditions, Flow, FlowParams, Refinement};
 
@@ -13,10 +13,7 @@ const RADIUS: f64 = 0.1;
 const GAPS: [f64; 8] = [1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9];
 
 /// The flow around balls in the linear flow of a gradient, in a box that is periodic in all directions.
-fn flow<const D: usize>(balls: &[Ball<D>], level: u8, gradient: &Matrix<D>, tolerance: f64) -> Flow<D>
-where
-    Dim<D>: Space<D>,
-{
+fn flow<const D: usize>(balls: &[Ball<D>], level: u8, gradient: &Matrix<D>, tolerance: f64) -> Flow<D> {
     let mesh = Refinement::to_level(level).mesh(Aabb::unit(), [1; D], [true; D], balls).unwrap();
     let params = FlowParams { tolerance, ..FlowParams::for_dimension(D) };
     let mut solver = flow_solver::<D>(params);
@@ -35,20 +32,14 @@ fn gradient<const D: usize>(is_oblique: bool) -> Matrix<D> {
 }
 
 /// Rate of change of the distance of two balls.
-fn opening<const D: usize>(flow: &Flow<D>, balls: &[Ball<D>], [i, j]: [usize; 2]) -> f64
-where
-    Dim<D>: Space<D>,
-{
+fn opening<const D: usize>(flow: &Flow<D>, balls: &[Ball<D>], [i, j]: [usize; 2]) -> f64 {
     let branch = balls[j].center() - balls[i].center();
     let relative = flow.twists[j].velocity - flow.twists[i].velocity + flow.strain * branch;
     relative.dot(&branch.normalize())
 }
 
 /// Errors of the speeds at which two balls approach, the line of their centres at 135 degrees to the flow.
-fn pair<const D: usize>(level: u8, gap: f64, tolerances: [f64; 2]) -> f64
-where
-    Dim<D>: Space<D>,
-{
+fn pair<const D: usize>(level: u8, gap: f64, tolerances: [f64; 2]) -> f64 {
     let mut arm = Vector::<D>::zeros();
     (arm[0], arm[1]) = (-1.0, 1.0);
     let arm = arm.normalize() * (RADIUS * (1.0 + 0.5 * gap));

@@ -1,6 +1,6 @@
 //! Flows that the elements hold exactly are found exactly, on meshes with hanging nodes.
 
-use gluey_geom::{Dim, Space, Spin, Twist, Vector};
+use gluey_geom::{Dim, Spin, Twist, Vector};
 use gluey_levelset::Ball;
 use gluey_stokes::Formulation;
 
@@ -12,10 +12,7 @@ use crate::support::{
 /// Size of the wrong start; tolerances are relative to the residual it leaves.
 const DETOUR: f64 = 0.01;
 
-fn couette_flow_is_found<const D: usize>()
-where
-    Dim<D>: Space<D>,
-{
+fn couette_flow_is_found<const D: usize>() {
     for formulation in [paper(1e3, 1), UNFITTED] {
         for solver in SOLVERS {
             let mesh = graded::<D>(3 - (D as u8 - 2));
@@ -42,10 +39,7 @@ fn couette_flow_is_exact_in_3d() {
 }
 
 /// The start is the answer, and the right-hand side nothing but rounding.
-fn undisturbed_flow_stays<const D: usize>()
-where
-    Dim<D>: Space<D>,
-{
+fn undisturbed_flow_stays<const D: usize>() {
     for solver in SOLVERS {
         let flow = solve(params(UNFITTED, solver, 1e-8), graded::<D>(2), &[], &couette);
         assert!(nodal_error(&flow, &couette) < 1e-14);
@@ -61,10 +55,7 @@ fn an_empty_box_keeps_its_undisturbed_flow() {
 
 /// `u = y (1 - y) e_x`, `p = -2 x`. A residual at a pressure node is its error times the volume of a cell, so
 /// the same tolerance leaves more of the pressure in 3D.
-fn poiseuille_flow_is_found<const D: usize>()
-where
-    Dim<D>: Space<D>,
-{
+fn poiseuille_flow_is_found<const D: usize>() {
     let poiseuille = |x: &Vector<D>| couette::<D>(&Vector::from_fn(|_, _| 0.5 + x[1] * (1.0 - x[1])));
     let tolerance = 1e-10 * 10f64.powi(D as i32 - 2);
     for solver in SOLVERS {
@@ -88,10 +79,7 @@ fn poiseuille_flow_and_its_pressure_are_exact() {
 }
 
 /// When the boundary moves as one body, so does everything inside, on any mesh and in any formulation.
-fn everything_moves_as_one<const D: usize>(formulation: Formulation, level: u8)
-where
-    Dim<D>: Space<D>,
-{
+fn everything_moves_as_one<const D: usize>(formulation: Formulation, level: u8) {
     let tolerance = 1e-8;
     let center = Vector::<D>::repeat(0.5);
     let mut spin: Spin<D> = Dim::<D>::zero_spin();

@@ -1,6 +1,6 @@
 //! No force and no torque on free bodies, computed from the stress of the flow alone.
 
-use gluey_geom::{Dim, Space, Spin, Vector};
+use gluey_geom::{Dim, Spin, Vector};
 use gluey_levelset::{Ball, Body, Ramp};
 use gluey_stokes::{
     Flow, Formulation, PointMatrices, SolidNodes, SolidRegion, SolverKind, StokesSystem, VelocitySpace,
@@ -11,10 +11,7 @@ use crate::support::{SOLVERS, UNFITTED, bands, couette, mesh, pair_at, paper, pa
 
 /// Loads of the fluid's stress on all nodes of a flow, as if there were no bodies: what a body takes up
 /// shows.
-fn loads<const D: usize>(flow: &Flow<D>) -> Vec<f64>
-where
-    Dim<D>: Space<D>,
-{
+fn loads<const D: usize>(flow: &Flow<D>) -> Vec<f64> {
     let nowhere = vec![None; flow.discretisation.velocity.node_count()];
     let space = VelocitySpace::new::<Ball<D>>(&flow.discretisation, &[], &nowhere);
     let system = StokesSystem::new(space, 1.0);
@@ -24,10 +21,7 @@ where
 }
 
 /// The nodes that the solid of each body acts on, for bodies that share no cell.
-fn held_nodes<const D: usize>(flow: &Flow<D>, balls: &[Ball<D>], formulation: Formulation) -> SolidNodes
-where
-    Dim<D>: Space<D>,
-{
+fn held_nodes<const D: usize>(flow: &Flow<D>, balls: &[Ball<D>], formulation: Formulation) -> SolidNodes {
     let discretisation = &flow.discretisation;
     match formulation {
         Formulation::Paper(paper) => {
@@ -41,10 +35,7 @@ where
     }
 }
 
-fn free_bodies_feel_nothing<const D: usize>(balls: &[Ball<D>], level: u8, solvers: &[SolverKind])
-where
-    Dim<D>: Space<D>,
-{
+fn free_bodies_feel_nothing<const D: usize>(balls: &[Ball<D>], level: u8, solvers: &[SolverKind]) {
     for formulation in [UNFITTED, paper(1e3, 1)] {
         for &solver in solvers {
             let flow = solve(params(formulation, solver, 1e-12), mesh(&bands(level), balls), balls, &couette);

@@ -1,6 +1,6 @@
 //! How the penalised formulation tends to rigidity, and what both say of one flow.
 
-use gluey_geom::{Dim, Space, Twist, Vector};
+use gluey_geom::{Dim, Twist, Vector};
 use gluey_levelset::{Ball, Ramp};
 use gluey_stokes::{
     DirectSolver, Discretisation, Flow, Formulation, PaperParams, PointMatrices, SaddleSolver, SolidRegion,
@@ -49,10 +49,7 @@ fn motions_tend_to_a_limit_as_the_viscosity_ratio_rises() {
 
 /// Flow around bodies that are the cells whose centre lies inside, eliminated: every node of these cells is
 /// rigid.
-fn twists_of_rigid_cells<const D: usize>(balls: &[Ball<D>], level: u8) -> Vec<Twist<D>>
-where
-    Dim<D>: Space<D>,
-{
+fn twists_of_rigid_cells<const D: usize>(balls: &[Ball<D>], level: u8) -> Vec<Twist<D>> {
     let discretisation = Discretisation::new(mesh(&bands(level), balls));
     let region = SolidRegion::new(&discretisation, balls, Ramp::new(STEP), &PointMatrices::new(1));
     let solid = region.touched_nodes(&discretisation.velocity, balls);
@@ -74,10 +71,7 @@ where
 /// A ramp so thin that the solid fraction at a cell's centre, the only quadrature point, is 0 or 1.
 const STEP: f64 = 1e-12;
 
-fn penalised_cells_become_rigid<const D: usize>(balls: &[Ball<D>], level: u8)
-where
-    Dim<D>: Space<D>,
-{
+fn penalised_cells_become_rigid<const D: usize>(balls: &[Ball<D>], level: u8) {
     let rigid = twists_of_rigid_cells(balls, level);
     let cell = 0.5f64.powi(level.into());
     let errors = [1e2, 1e3, 1e4].map(|viscosity_ratio| {
@@ -115,10 +109,7 @@ fn every_uzawa_step_makes_the_body_more_rigid() {
 
 /// Soft as the ball is, it cannot tell one side from the other: in the middle of the shear both readings of
 /// its motion are rest and half the shear rate.
-fn at_the_middle_both_velocities_agree<const D: usize>(level: u8)
-where
-    Dim<D>: Space<D>,
-{
+fn at_the_middle_both_velocities_agree<const D: usize>(level: u8) {
     let ball = [Ball::new(Vector::<D>::repeat(0.5), 0.2)];
     let motion = |formulation: Formulation| {
         let params = params(formulation, SolverKind::Direct, 1e-11);

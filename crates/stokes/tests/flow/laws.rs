@@ -10,7 +10,7 @@
 
 use std::f64::consts::PI;
 
-use gluey_geom::{Dim, Matrix, Space, Spin, Twist, Vector, Wrench};
+use gluey_geom::{Dim, Matrix, Spin, Twist, Vector, Wrench};
 use gluey_levelset::{Ball, Body};
 use gluey_stokes::{Conditions, Formulation, Prepared, SolverKind};
 
@@ -37,10 +37,7 @@ fn around_moving<const D: usize>(r: &Vector<D>, u: &Vector<D>) -> Vector<D> {
 }
 
 /// Flow around a ball that turns.
-fn around_turning<const D: usize>(r: &Vector<D>, spin: &Spin<D>) -> Vector<D>
-where
-    Dim<D>: Space<D>,
-{
+fn around_turning<const D: usize>(r: &Vector<D>, spin: &Spin<D>) -> Vector<D> {
     Dim::<D>::cross_spin(spin, r) * (RADIUS / r.norm()).min(1.0).powi(D as i32)
 }
 
@@ -57,10 +54,7 @@ fn around_strained<const D: usize>(r: &Vector<D>, strain: &Matrix<D>) -> Vector<
 }
 
 /// A motion of the ball, and the wrench it takes.
-fn motion<const D: usize>() -> (Twist<D>, Wrench<D>)
-where
-    Dim<D>: Space<D>,
-{
+fn motion<const D: usize>() -> (Twist<D>, Wrench<D>) {
     let mut spin: Spin<D> = Dim::<D>::zero_spin();
     (0..Dim::<D>::ROT).for_each(|k| spin[k] = 1.0 + k as f64);
     let velocity = Vector::from_fn(|d, _| 0.6 - 0.5 * d as f64);
@@ -69,18 +63,12 @@ where
     (Twist { velocity, spin }, Wrench { force: velocity * drag, torque })
 }
 
-fn norm<const D: usize>(spin: &Spin<D>) -> f64
-where
-    Dim<D>: Space<D>,
-{
+fn norm<const D: usize>(spin: &Spin<D>) -> f64 {
     Dim::<D>::spin_slice(spin).iter().map(|w| w * w).sum::<f64>().sqrt()
 }
 
 /// Relative errors of velocity, spin, force, torque and stresslet.
-fn errors<const D: usize>(formulation: Formulation, level: u8) -> [f64; 5]
-where
-    Dim<D>: Space<D>,
-{
+fn errors<const D: usize>(formulation: Formulation, level: u8) -> [f64; 5] {
     let ball = Ball::new(Vector::<D>::from_fn(|d, _| 0.51 - 0.02 * d as f64), RADIUS);
     let kind = if D == 2 { SolverKind::Direct } else { SolverKind::Multigrid };
     let mut solver = flow_solver(params(formulation, kind, 1e-9));
@@ -107,10 +95,7 @@ where
 }
 
 /// Relative error of the stresslet, which is the same for a held and for a free ball.
-fn stresslet_error<const D: usize>(prepared: &mut Prepared<'_, D>, ball: &Ball<D>) -> f64
-where
-    Dim<D>: Space<D>,
-{
+fn stresslet_error<const D: usize>(prepared: &mut Prepared<'_, D>, ball: &Ball<D>) -> f64 {
     let gradient = Matrix::<D>::from_fn(|i, j| 0.3 + (i * j) as f64 - 0.2 * (i + j) as f64);
     let strain = gradient - Matrix::identity() * (gradient.trace() / D as f64);
     let exact = strain * ((D + 2) as f64 * volume(D));
@@ -125,10 +110,7 @@ where
     (free - exact).norm() / exact.norm()
 }
 
-fn obeys<const D: usize>(formulation: Formulation, level: u8, measured: [f64; 5])
-where
-    Dim<D>: Space<D>,
-{
+fn obeys<const D: usize>(formulation: Formulation, level: u8, measured: [f64; 5]) {
     let found = errors::<D>(formulation, level);
     let is_near = |(found, measured): (&f64, &f64)| *found <= 2.0 * measured;
     let name = format!("{D}D, {formulation:?}, level {level}");

@@ -1,6 +1,6 @@
 //! Forces and torques on bodies: reciprocity, and bodies that are held against bodies that are free.
 
-use gluey_geom::{Aabb, Dim, Space, Spin, Twist, Vector, Wrench};
+use gluey_geom::{Aabb, Dim, Spin, Twist, Vector, Wrench};
 use gluey_levelset::{Ball, Body};
 use gluey_stokes::{
     Conditions, FlowSolver, Formulation, GivenOf, Prepared, Problem, SolverKind, StokesError,
@@ -27,10 +27,7 @@ fn level(dimension: usize) -> u8 {
 }
 
 /// Different wrenches on two bodies.
-fn wrenches<const D: usize>() -> [Wrench<D>; 2]
-where
-    Dim<D>: Space<D>,
-{
+fn wrenches<const D: usize>() -> [Wrench<D>; 2] {
     [0.0, 1.0].map(|body| {
         let mut torque: Spin<D> = Dim::<D>::zero_spin();
         (0..Dim::<D>::ROT).for_each(|k| torque[k] = 0.2 * body - 0.1 * (1 + k) as f64);
@@ -39,10 +36,7 @@ where
 }
 
 /// Largest difference of any force or (over the radius) torque.
-fn wrench_distance<const D: usize>(a: &[Wrench<D>], b: &[Wrench<D>]) -> f64
-where
-    Dim<D>: Space<D>,
-{
+fn wrench_distance<const D: usize>(a: &[Wrench<D>], b: &[Wrench<D>]) -> f64 {
     let torques =
         |w: &Wrench<D>| Dim::<D>::spin_slice(&w.torque).iter().fold(0.0, |m: f64, t| m.max(t.abs()));
     let size = |w: Wrench<D>| w.force.amax().max(torques(&w) / RADIUS);
@@ -50,18 +44,12 @@ where
 }
 
 /// A solver to this tolerance.
-fn solver<const D: usize>(formulation: Formulation, kind: SolverKind, tolerance: f64) -> FlowSolver<D>
-where
-    Dim<D>: Space<D>,
-{
+fn solver<const D: usize>(formulation: Formulation, kind: SolverKind, tolerance: f64) -> FlowSolver<D> {
     flow_solver(params(formulation, kind, tolerance))
 }
 
 /// The two unequal balls, prepared.
-fn prepared<const D: usize>(solver: &mut FlowSolver<D>) -> Prepared<'_, D>
-where
-    Dim<D>: Space<D>,
-{
+fn prepared<const D: usize>(solver: &mut FlowSolver<D>) -> Prepared<'_, D> {
     let balls = unequal::<D>();
     solver.prepared(mesh(&bands(level(D)), &balls), &balls).unwrap()
 }
@@ -77,10 +65,7 @@ fn asymmetry(matrix: &DMatrix<f64>) -> f64 {
 }
 
 /// Symmetric to the tolerance of the solves (reciprocal theorem), and positive definite (dissipation).
-fn mobility_is_reciprocal<const D: usize>(formulation: Formulation, kind: SolverKind, least: f64)
-where
-    Dim<D>: Space<D>,
-{
+fn mobility_is_reciprocal<const D: usize>(formulation: Formulation, kind: SolverKind, least: f64) {
     let matrix = prepared::<D>(&mut solver(formulation, kind, 1e-10)).mobility().unwrap();
     small("asymmetry of the mobility", asymmetry(&matrix), 1.9e-10);
     let found = matrix.symmetric_eigen().eigenvalues.min();
@@ -98,10 +83,7 @@ fn the_mobility_is_symmetric_and_positive_definite() {
 }
 
 /// Bodies that are held and bodies that are free are solved for in different ways.
-fn resistance_inverts_mobility<const D: usize>(kind: SolverKind)
-where
-    Dim<D>: Space<D>,
-{
+fn resistance_inverts_mobility<const D: usize>(kind: SolverKind) {
     let mut solver = solver(UNFITTED, kind, 1e-11);
     let mut prepared = prepared::<D>(&mut solver);
     let (mobility, resistance) = (prepared.mobility().unwrap(), prepared.resistance().unwrap());
@@ -129,9 +111,7 @@ fn a_free_body_beside_a_held_one<const D: usize>(
     formulation: Formulation,
     kind: SolverKind,
     [force, motion]: [f64; 2],
-) where
-    Dim<D>: Space<D>,
-{
+) {
     let mut solver = solver(formulation, kind, 1e-10);
     let mut prepared = prepared::<D>(&mut solver);
     let mut driven = Twist { velocity: Vector::from_fn(|d, _| 0.3 - 0.5 * d as f64), ..Twist::default() };
@@ -177,10 +157,7 @@ fn a_solver_may_be_kept_with_its_flows() {
 }
 
 /// One preparation for four flows, in any order, against four solvers.
-fn one_preparation_serves_all<const D: usize>(formulation: Formulation, kind: SolverKind)
-where
-    Dim<D>: Space<D>,
-{
+fn one_preparation_serves_all<const D: usize>(formulation: Formulation, kind: SolverKind) {
     let (balls, wrenches) = (unequal::<D>(), wrenches::<D>());
     let twists = [Twist::default(), Twist { velocity: Vector::repeat(0.3), ..Twist::default() }];
     let gravity = |x: &Vector<D>| Vector::repeat(x[0]);
@@ -214,10 +191,7 @@ fn several_right_hand_sides_are_as_good_as_separate_solves() {
 }
 
 /// Flows add up: shear, forces on the bodies, and both. A held body needs what moves a free one.
-fn flows_add_up<const D: usize>(formulation: Formulation, kind: SolverKind)
-where
-    Dim<D>: Space<D>,
-{
+fn flows_add_up<const D: usize>(formulation: Formulation, kind: SolverKind) {
     let wrenches = wrenches::<D>();
     let mut solver = solver(formulation, kind, 1e-11);
     let mut prepared = prepared::<D>(&mut solver);
@@ -248,10 +222,7 @@ fn shear_and_forces_add_up() {
 }
 
 /// The penalised solid takes up the whole force and torque, also where its cells are cut.
-fn loads_are_exact<const D: usize>(measured: f64)
-where
-    Dim<D>: Space<D>,
-{
+fn loads_are_exact<const D: usize>(measured: f64) {
     let (balls, wrenches) = (unequal::<D>(), wrenches::<D>());
     let mesh = mesh(&bands(level(D)), &balls);
     let problem = Problem::new(mesh, &balls, 1.0, paper(1e2, 2)).unwrap();
@@ -277,10 +248,7 @@ fn a_penalised_solid_takes_up_all_of_a_wrench() {
 }
 
 /// The solvers for held bodies: with a film between them, and with so many that they act as a porous medium.
-fn iterations_of_held<const D: usize>(balls: &[Ball<D>], kind: SolverKind) -> usize
-where
-    Dim<D>: Space<D>,
-{
+fn iterations_of_held<const D: usize>(balls: &[Ball<D>], kind: SolverKind) -> usize {
     let mut solver = flow_solver(params(UNFITTED, kind, 1e-8));
     let level = if D == 2 { 7 } else { 5 };
     let mut prepared = solver.prepared(mesh(&bands(level), balls), balls).unwrap();

@@ -1,24 +1,18 @@
 //! The operator in double precision, and one V-cycle as a solver.
 
 use gluey_fem::TreeMesh;
-use gluey_geom::{Aabb, Dim, Space, Vector};
+use gluey_geom::{Aabb, Vector};
 use gluey_levelset::Ball;
 use gluey_linalg::{LinOp, Preconditioner, vector};
 use gluey_stokes::{Formulation, MultigridSolver, Problem, Refinement, SaddleSolver, SystemOperator};
 
 use crate::support::{UNFITTED, balls, graded, mesh, paper};
 
-fn problem<const D: usize>(mesh: TreeMesh<D>, balls: &[Ball<D>], formulation: Formulation) -> Problem<D>
-where
-    Dim<D>: Space<D>,
-{
+fn problem<const D: usize>(mesh: TreeMesh<D>, balls: &[Ball<D>], formulation: Formulation) -> Problem<D> {
     Problem::new(mesh, balls, 1.0, formulation).unwrap()
 }
 
-fn operator_is_symmetric<const D: usize>(formulation: Formulation)
-where
-    Dim<D>: Space<D>,
-{
+fn operator_is_symmetric<const D: usize>(formulation: Formulation) {
     // Close enough to share cells.
     let pair =
         [0.3, 0.58].map(|x| Ball::new(Vector::<D>::from_fn(|d, _| if d == 0 { x } else { 0.4 }), 0.13));
@@ -54,10 +48,7 @@ fn the_operator_is_symmetric_to_round_off() {
 
 /// Factor by which a V-cycle shortens the error in the energy norm, after enough of them to find the worst
 /// direction.
-fn contraction<const D: usize>(problem: &Problem<D>) -> f64
-where
-    Dim<D>: Space<D>,
-{
+fn contraction<const D: usize>(problem: &Problem<D>) -> f64 {
     let (system, split) = (&problem.system, problem.system.velocity_dim());
     let mut solver = MultigridSolver::default();
     solver.prepare(problem).unwrap();
@@ -77,10 +68,7 @@ where
     (energies[15] / energies[11]).powf(0.25)
 }
 
-fn contractions<const D: usize>(balls: &[Ball<D>], levels: &[u8]) -> Vec<f64>
-where
-    Dim<D>: Space<D>,
-{
+fn contractions<const D: usize>(balls: &[Ball<D>], levels: &[u8]) -> Vec<f64> {
     let uniform = |level| TreeMesh::uniform(Aabb::unit(), [1; D], [false; D], level).unwrap();
     levels.iter().map(|&level| contraction(&problem(uniform(level), balls, UNFITTED))).collect()
 }

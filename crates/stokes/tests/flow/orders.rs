@@ -1,7 +1,7 @@
 //! Convergence to smooth solutions, and of a particle's motion to the exact one.
 
 use gluey_fem::TreeMesh;
-use gluey_geom::{Aabb, Dim, Matrix, Space, Spin, Vector};
+use gluey_geom::{Aabb, Dim, Matrix, Spin, Vector};
 use gluey_levelset::Ball;
 use gluey_stokes::{Refinement, SolverKind};
 use gluey_testkit::convergence_order;
@@ -34,10 +34,7 @@ fn orders<const D: usize>(
     levels: &[u8],
     solver: SolverKind,
     mesh: impl Fn(u8) -> TreeMesh<D>,
-) -> (f64, f64)
-where
-    Dim<D>: Space<D>,
-{
+) -> (f64, f64) {
     let sizes: Vec<f64> = levels.iter().map(|&level| 0.5f64.powi(level.into())).collect();
     let errors = levels.iter().map(|&level| {
         let mut solver = flow_solver(params(UNFITTED, solver, 1e-9));
@@ -50,10 +47,7 @@ where
     (convergence_order(&sizes, &velocity), convergence_order(&sizes, &pressure))
 }
 
-fn check<const D: usize>(exact: &impl StokesSolution<D>, levels: &[u8], solver: SolverKind)
-where
-    Dim<D>: Space<D>,
-{
+fn check<const D: usize>(exact: &impl StokesSolution<D>, levels: &[u8], solver: SolverKind) {
     let uniform = |level| TreeMesh::uniform(Aabb::unit(), [1; D], [false; D], level).unwrap();
     for (velocity, pressure) in
         [orders(exact, levels, solver, uniform), orders(exact, levels, solver, graded)]
@@ -87,10 +81,7 @@ fn body_error<const D: usize>(
     spin: Spin<D>,
     level: u8,
     solver: SolverKind,
-) -> f64
-where
-    Dim<D>: Space<D>,
-{
+) -> f64 {
     use gluey_levelset::Body;
     // Else what is seen in 2D is the error of larger cells away from the disc.
     let coarsest = if D == 2 { level } else { 3 };

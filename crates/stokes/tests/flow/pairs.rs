@@ -1,6 +1,6 @@
 //! Two particles near contact against the reference data.
 
-use gluey_geom::{Dim, Space, Vector};
+use gluey_geom::Vector;
 use gluey_levelset::Ball;
 use gluey_stokes::{Refinement, SolverKind};
 use gluey_testkit::reference::pair_2d_velocities;
@@ -9,10 +9,7 @@ use crate::support::{
     PairMotion, RADIUS, UNFITTED, balls, bands, couette, mesh, pair_at, pair_motion, params, solve,
 };
 
-fn motion<const D: usize>(balls: &[Ball<D>], refinement: &Refinement, solver: SolverKind) -> PairMotion
-where
-    Dim<D>: Space<D>,
-{
+fn motion<const D: usize>(balls: &[Ball<D>], refinement: &Refinement, solver: SolverKind) -> PairMotion {
     let flow = solve(params(UNFITTED, solver, 1e-8), mesh(refinement, balls), balls, &couette);
     pair_motion(balls, &flow.twists)
 }

@@ -2,17 +2,14 @@
 //! ratio, the mesh or the number of particles.
 
 use gluey_fem::TreeMesh;
-use gluey_geom::{Aabb, Dim, Space, Vector};
+use gluey_geom::{Aabb, Vector};
 use gluey_levelset::Ball;
 use gluey_stokes::SolverKind;
 
 use crate::support::{SOLVERS, balls, bands, couette, doublet, mesh, paper, params, solve, twist_distance};
 
 /// Iterations to 1e-8 of one penalised solve.
-fn iterations<const D: usize>(viscosity_ratio: f64, balls: &[Ball<D>], mesh: TreeMesh<D>) -> usize
-where
-    Dim<D>: Space<D>,
-{
+fn iterations<const D: usize>(viscosity_ratio: f64, balls: &[Ball<D>], mesh: TreeMesh<D>) -> usize {
     let params = params(paper(viscosity_ratio, 1), SolverKind::Multigrid, 1e-8);
     solve(params, mesh, balls, &couette).iteration_count
 }

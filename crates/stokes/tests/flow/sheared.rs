@@ -3,7 +3,7 @@
 use std::f64::consts::PI;
 
 use gluey_fem::TreeMesh;
-use gluey_geom::{Aabb, Dim, Lattice, Matrix, Space, Vector};
+use gluey_geom::{Aabb, Dim, Lattice, Matrix, Vector};
 use gluey_levelset::Ball;
 use gluey_stokes::{
     Conditions, Flow, FlowParams, FlowSolver, Formulation, PaperParams, Refinement, SolverKind, StokesError,
@@ -34,35 +34,23 @@ impl<const D: usize> Box<D> {
     }
 
     /// The flow in simple shear with its stress.
-    fn flow(&self, places: &[Vector<D>], radius: f64) -> Flow<D>
-    where
-        Dim<D>: Space<D>,
-    {
+    fn flow(&self, places: &[Vector<D>], radius: f64) -> Flow<D> {
         self.flow_by(&mut self.flow_solver(), places, radius)
     }
 
-    fn flow_solver(&self) -> FlowSolver<D>
-    where
-        Dim<D>: Space<D>,
-    {
+    fn flow_solver(&self) -> FlowSolver<D> {
         let params = FlowParams { solver: self.solver, tolerance: 1e-9, ..FlowParams::for_dimension(D) };
         flow_solver(params)
     }
 
     /// The same by a solver that may remember another flow.
-    fn flow_by(&self, solver: &mut FlowSolver<D>, places: &[Vector<D>], radius: f64) -> Flow<D>
-    where
-        Dim<D>: Space<D>,
-    {
+    fn flow_by(&self, solver: &mut FlowSolver<D>, places: &[Vector<D>], radius: f64) -> Flow<D> {
         let balls = self.balls(places, radius);
         let mesh = self.mesh(&balls);
         solver.solve_under(mesh, &balls, &Conditions::in_linear_flow(&shear()).with_stress()).unwrap()
     }
 
-    fn mesh(&self, balls: &[Ball<D>]) -> TreeMesh<D>
-    where
-        Dim<D>: Space<D>,
-    {
+    fn mesh(&self, balls: &[Ball<D>]) -> TreeMesh<D> {
         let domain = Aabb { lower: Vector::zeros(), upper: Vector::from(self.periods) };
         let roots = self.periods.map(|period| period as u32);
         let refinement = Refinement { coarsest: self.level, ..Refinement::to_level(self.level) };
@@ -81,20 +69,14 @@ fn shear<const D: usize>() -> Matrix<D> {
 }
 
 /// Relative viscosity, first and second normal stress difference.
-fn rheology<const D: usize>(flow: &Flow<D>, volume: f64) -> [f64; 3]
-where
-    Dim<D>: Space<D>,
-{
+fn rheology<const D: usize>(flow: &Flow<D>, volume: f64) -> [f64; 3] {
     let stress = flow.stress.as_ref().unwrap().of_bodies(volume);
     let last = stress[(D - 1, D - 1)];
     [1.0 + stress[(0, 1)], stress[(0, 0)] - stress[(1, 1)], stress[(1, 1)] - last]
 }
 
 /// Spin about z of a body in space, where the undisturbed flow turns at -1/2.
-fn spin<const D: usize>(flow: &Flow<D>, body: usize) -> f64
-where
-    Dim<D>: Space<D>,
-{
+fn spin<const D: usize>(flow: &Flow<D>, body: usize) -> f64 {
     Dim::<D>::spin_slice(&flow.twists[body].spin).last().unwrap() - 0.5
 }
 
@@ -113,10 +95,7 @@ fn errors_of_lattice<const D: usize>(
     level: u8,
     radius: impl Fn(f64) -> f64,
     exact: impl Iterator<Item = Vec<f64>>,
-) -> [f64; 3]
-where
-    Dim<D>: Space<D>,
-{
+) -> [f64; 3] {
     let mut errors = [0.0f64; 3];
     for (index, exact) in exact.enumerate() {
         let in_box = Box::<D>::unit(exact[1], level);
@@ -178,10 +157,7 @@ fn every_disc_of_a_cell_has_its_velocity() {
 }
 
 /// Where the seam is and how the cell is named: the box moved, a strain more, two boxes side by side.
-fn the_seam_is_nowhere<const D: usize>(level: u8, tolerance: f64)
-where
-    Dim<D>: Space<D>,
-{
+fn the_seam_is_nowhere<const D: usize>(level: u8, tolerance: f64) {
     let (strain, radius) = (0.35, 0.13);
     let places = [0.0, 1.0, 2.0].map(somewhere::<D>);
     let here = Box::<D>::unit(strain, level);
@@ -218,10 +194,7 @@ fn the_result_does_not_know_where_the_seam_is() {
 }
 
 /// The stress does the power that is dissipated, and multigrid and direct solver agree.
-fn routes_agree<const D: usize>(level: u8, tolerance: f64)
-where
-    Dim<D>: Space<D>,
-{
+fn routes_agree<const D: usize>(level: u8, tolerance: f64) {
     let places = [0.0, 1.0, 2.0].map(somewhere::<D>);
     let in_box = Box::<D>::unit(-0.2, level);
     let [direct, multigrid] = [SolverKind::Direct, SolverKind::Multigrid]

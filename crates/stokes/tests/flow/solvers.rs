@@ -1,7 +1,7 @@
 //! The linear solvers: they agree, they repeat themselves to the bit, and their effort does not grow.
 
 use gluey_fem::TreeMesh;
-use gluey_geom::{Aabb, Dim, Space, Vector};
+use gluey_geom::{Aabb, Dim, Vector};
 use gluey_levelset::Ball;
 use gluey_stokes::{Flow, FlowSolver, Formulation, Lubrication, SolverKind};
 
@@ -41,10 +41,7 @@ fn direct_and_multigrid_agree_on_the_doublet() {
     }
 }
 
-fn iterations<const D: usize>(formulation: Formulation, balls: &[Ball<D>], levels: &[u8]) -> Vec<usize>
-where
-    Dim<D>: Space<D>,
-{
+fn iterations<const D: usize>(formulation: Formulation, balls: &[Ball<D>], levels: &[u8]) -> Vec<usize> {
     let count = |&level| {
         let params = params(formulation, SolverKind::Multigrid, 1e-8);
         solve(params, mesh(&bands(level), balls), balls, &couette).iteration_count
@@ -148,10 +145,7 @@ fn films_that_two_layers_of_cells_share_are_solved_for() {
 }
 
 /// Everything a flow is made of, as bits.
-fn bits<const D: usize>(flow: &Flow<D>) -> Vec<u64>
-where
-    Dim<D>: Space<D>,
-{
+fn bits<const D: usize>(flow: &Flow<D>) -> Vec<u64> {
     let twists = flow.twists.iter().flat_map(|t| {
         t.velocity.iter().copied().chain(Dim::<D>::spin_slice(&t.spin).iter().copied()).collect::<Vec<_>>()
     });
@@ -159,10 +153,7 @@ where
     fields.chain(twists).map(f64::to_bits).collect()
 }
 
-fn runs_repeat<const D: usize>(balls: &[Ball<D>], level: u8, solvers: &[SolverKind])
-where
-    Dim<D>: Space<D>,
-{
+fn runs_repeat<const D: usize>(balls: &[Ball<D>], level: u8, solvers: &[SolverKind]) {
     for formulation in [paper(1e3, 2), UNFITTED] {
         for &solver in solvers {
             let run = |threads: usize| {

@@ -2,7 +2,7 @@
 
 use gluey_fem::TreeMesh;
 use gluey_fem::element::{gauss_cube, value};
-use gluey_geom::{Aabb, Dim, Space, Twist, Vector};
+use gluey_geom::{Aabb, Dim, Twist, Vector};
 use gluey_levelset::{Ball, Body, LevelSet};
 use gluey_stokes::{
     Flow, FlowParams, FlowSolver, Formulation, Lubrication, PaperParams, ParticleVelocity, Refinement,
@@ -54,10 +54,7 @@ pub fn graded<const D: usize>(level: u8) -> TreeMesh<D> {
 }
 
 /// A solver of flows that computes on the thread of its test.
-pub fn flow_solver<const D: usize>(params: FlowParams) -> FlowSolver<D>
-where
-    Dim<D>: Space<D>,
-{
+pub fn flow_solver<const D: usize>(params: FlowParams) -> FlowSolver<D> {
     compute_alone();
     FlowSolver::new(params).unwrap()
 }
@@ -68,10 +65,7 @@ pub fn try_solve<const D: usize>(
     mesh: TreeMesh<D>,
     balls: &[Ball<D>],
     boundary: &dyn Fn(&Vector<D>) -> Vector<D>,
-) -> Result<Flow<D>, StokesError>
-where
-    Dim<D>: Space<D>,
-{
+) -> Result<Flow<D>, StokesError> {
     compute_alone();
     FlowSolver::new(params)?.solve(mesh, balls, boundary)
 }
@@ -82,10 +76,7 @@ pub fn solve<const D: usize>(
     mesh: TreeMesh<D>,
     balls: &[Ball<D>],
     boundary: &dyn Fn(&Vector<D>) -> Vector<D>,
-) -> Flow<D>
-where
-    Dim<D>: Space<D>,
-{
+) -> Flow<D> {
     try_solve(params, mesh, balls, boundary).unwrap()
 }
 
@@ -138,10 +129,7 @@ pub struct PairMotion {
 }
 
 /// Relative motion of the first two balls.
-pub fn pair_motion<const D: usize>(balls: &[Ball<D>], twists: &[Twist<D>]) -> PairMotion
-where
-    Dim<D>: Space<D>,
-{
+pub fn pair_motion<const D: usize>(balls: &[Ball<D>], twists: &[Twist<D>]) -> PairMotion {
     let line = balls[1].center() - balls[0].center();
     let e = line.normalize();
     let relative = twists[1].velocity - twists[0].velocity;
@@ -154,10 +142,7 @@ where
 }
 
 /// Largest difference of any velocity or (times the radius) spin.
-pub fn twist_distance<const D: usize>(a: &[Twist<D>], b: &[Twist<D>]) -> f64
-where
-    Dim<D>: Space<D>,
-{
+pub fn twist_distance<const D: usize>(a: &[Twist<D>], b: &[Twist<D>]) -> f64 {
     let spin = |t: &Twist<D>, k: usize| Dim::<D>::spin_slice(&t.spin)[k];
     let distance = |(a, b): (&Twist<D>, &Twist<D>)| {
         let spins = (0..Dim::<D>::ROT).map(|k| RADIUS * (spin(a, k) - spin(b, k)).abs());
@@ -168,10 +153,7 @@ where
 }
 
 /// Largest nodal error of the velocity.
-pub fn nodal_error<const D: usize>(flow: &Flow<D>, exact: &dyn Fn(&Vector<D>) -> Vector<D>) -> f64
-where
-    Dim<D>: Space<D>,
-{
+pub fn nodal_error<const D: usize>(flow: &Flow<D>, exact: &dyn Fn(&Vector<D>) -> Vector<D>) -> f64 {
     let nodes = &flow.discretisation.velocity;
     let error = |n: usize| {
         let u = Vector::<D>::from_column_slice(&flow.velocity[n * D..][..D]);
@@ -182,10 +164,7 @@ where
 
 /// Largest deviation of the nodal velocity from the rigid motion of a ball, `depth` or more inside its
 /// surface, relative to `a` times the shear rate 1.
-pub fn strain_inside<const D: usize>(flow: &Flow<D>, balls: &[Ball<D>], depth: f64) -> f64
-where
-    Dim<D>: Space<D>,
-{
+pub fn strain_inside<const D: usize>(flow: &Flow<D>, balls: &[Ball<D>], depth: f64) -> f64 {
     let nodes = &flow.discretisation.velocity;
     let mut worst: f64 = 0.0;
     for (ball, twist) in balls.iter().zip(&flow.twists) {
@@ -199,10 +178,7 @@ where
 }
 
 /// L2 errors of the velocity and of the pressure less its mean, by a Gauss rule on every cell.
-pub fn l2_errors<const D: usize>(flow: &Flow<D>, exact: &impl StokesSolution<D>) -> (f64, f64)
-where
-    Dim<D>: Space<D>,
-{
+pub fn l2_errors<const D: usize>(flow: &Flow<D>, exact: &impl StokesSolution<D>) -> (f64, f64) {
     let rule = gauss_cube::<D>(4);
     let Flow { discretisation, velocity, pressure, .. } = flow;
     let (mut volume, mut u_square, mut p_mean, mut p_square) = (0.0, 0.0, 0.0, 0.0);

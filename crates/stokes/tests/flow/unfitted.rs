@@ -1,7 +1,7 @@
 //! The unfitted formulation against the reference data, at walls, across periodic borders, at contact.
 
 use gluey_fem::TreeMesh;
-use gluey_geom::{Aabb, Dim, Space, Spin, Twist, Vector, Wrench};
+use gluey_geom::{Aabb, Spin, Twist, Vector, Wrench};
 use gluey_levelset::{Ball, LevelSet};
 use gluey_linalg::{LinOp, vector};
 use gluey_stokes::{Conditions, Flow, Problem, Refinement, SolverKind, StokesError, SystemOperator};
@@ -12,10 +12,7 @@ use crate::support::{
     strain_inside, try_solve, twist_distance,
 };
 
-fn flow<const D: usize>(balls: &[Ball<D>], level: u8, solver: SolverKind) -> Flow<D>
-where
-    Dim<D>: Space<D>,
-{
+fn flow<const D: usize>(balls: &[Ball<D>], level: u8, solver: SolverKind) -> Flow<D> {
     let refinement = Refinement { band: 3.0, ..bands(level) };
     solve(params(UNFITTED, solver, 1e-9), mesh(&refinement, balls), balls, &couette)
 }
@@ -78,10 +75,7 @@ fn pairs_approach_as_the_reference_says() {
 }
 
 /// Two bodies that share cells.
-fn the_operator_is_symmetric<const D: usize>(level: u32)
-where
-    Dim<D>: Space<D>,
-{
+fn the_operator_is_symmetric<const D: usize>(level: u32) {
     let pair =
         [0.3, 0.58].map(|x| Ball::new(Vector::<D>::from_fn(|d, _| if d == 0 { x } else { 0.4 }), 0.13));
     let mesh = TreeMesh::uniform(Aabb::unit(), [1; D], [false; D], level as u8).unwrap();
@@ -109,10 +103,7 @@ fn the_operator_is_symmetric_to_round_off() {
 }
 
 /// Both solvers, on meshes of every kind and bodies in every place.
-fn solvers_agree<const D: usize>(balls: &[Ball<D>], mesh: &dyn Fn() -> TreeMesh<D>, tolerance: f64)
-where
-    Dim<D>: Space<D>,
-{
+fn solvers_agree<const D: usize>(balls: &[Ball<D>], mesh: &dyn Fn() -> TreeMesh<D>, tolerance: f64) {
     let twists = |solver| solve(params(UNFITTED, solver, 1e-9), mesh(), balls, &couette).twists;
     let [direct, multigrid]: [Vec<Twist<D>>; 2] = [SolverKind::Direct, SolverKind::Multigrid].map(twists);
     let distance = twist_distance(&direct, &multigrid);
@@ -129,10 +120,7 @@ fn both_solvers_give_the_same_motion() {
 }
 
 /// A body across a periodic border moves as one in the middle does.
-fn the_border_is_not_felt<const D: usize>(level: u8, solver: SolverKind)
-where
-    Dim<D>: Space<D>,
-{
+fn the_border_is_not_felt<const D: usize>(level: u8, solver: SolverKind) {
     let mut periodic = [true; D];
     periodic[1] = false;
     let period = periodic.map(|is_periodic| is_periodic.then_some(1.0));
@@ -187,10 +175,7 @@ fn surfaces_that_meet_cells_of_different_sizes_are_refused() {
 }
 
 /// The flow continues beyond surfaces; bodies are drawn as they move.
-fn bodies_are_rigid_in_pictures<const D: usize>(level: u8, kind: SolverKind)
-where
-    Dim<D>: Space<D>,
-{
+fn bodies_are_rigid_in_pictures<const D: usize>(level: u8, kind: SolverKind) {
     let ball = [Ball::new(Vector::<D>::from_fn(|d, _| 0.47 + 0.06 * d as f64), 0.21)];
     let flow = flow(&ball, level, kind);
     let drawn = Flow { velocity: flow.velocity_with_bodies(&ball), ..flow.clone() };
@@ -221,10 +206,7 @@ fn at_rest<const D: usize>(
     level: u8,
     force: Option<&dyn Fn(&Vector<D>) -> Vector<D>>,
     wrenches: &[Wrench<D>],
-) -> Vec<Twist<D>>
-where
-    Dim<D>: Space<D>,
-{
+) -> Vec<Twist<D>> {
     let kind = if D == 2 { SolverKind::Direct } else { SolverKind::Multigrid };
     let conditions = Conditions::at_rest().with_force(force).with_wrenches(wrenches);
     let bodies = crowd::<D>();
@@ -235,10 +217,7 @@ where
 
 /// A pressure balances a force with a potential: to rounding where the potential is linear, to the error of
 /// the pressure where it is quadratic. The same force along one axis that grows along the other stirs.
-fn a_pressure_balances<const D: usize>(level: u8, [linear, quadratic]: [f64; 2])
-where
-    Dim<D>: Space<D>,
-{
+fn a_pressure_balances<const D: usize>(level: u8, [linear, quadratic]: [f64; 2]) {
     let rest = vec![Twist::default(); 3];
     let distance =
         |force: &dyn Fn(&Vector<D>) -> Vector<D>| twist_distance(&at_rest(level, Some(force), &[]), &rest);
@@ -269,10 +248,7 @@ fn a_uniform_force_adds_nothing_to_wrenches() {
 
 /// What holds bodies at rest is the opposite of the force on the fluid and them, as far as walls do not carry
 /// it: all of it between periodic borders.
-fn holding_takes_the_whole_force<const D: usize>(level: u8, kind: SolverKind)
-where
-    Dim<D>: Space<D>,
-{
+fn holding_takes_the_whole_force<const D: usize>(level: u8, kind: SolverKind) {
     let ball = Ball::periodic(Vector::<D>::repeat(0.1), 0.3, [Some(1.0); D]);
     let mesh = TreeMesh::uniform(Aabb::unit(), [1; D], [true; D], level).unwrap();
     let force = |_: &Vector<D>| Vector::<D>::from_fn(|d, _| 1.0 - 0.4 * d as f64);

@@ -3,7 +3,7 @@
 
 use gluey_contact::{ContactError, ContactLaw, ContactParams, Domain, PairContact};
 use gluey_contact::{StepGeometry, Wall};
-use gluey_geom::{Dim, Space, Twist, Vector};
+use gluey_geom::{Twist, Vector};
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 
@@ -32,10 +32,7 @@ pub(super) fn grow<const D: usize>(
     radii: &[f64],
     sweep_count: usize,
     random: &mut ChaCha8Rng,
-) -> Result<Vec<Vector<D>>, PackingError>
-where
-    Dim<D>: Space<D>,
-{
+) -> Result<Vec<Vector<D>>, PackingError> {
     let mut positions = points(container, radii, random);
     let enlarged: Vec<f64> = radii.iter().map(|radius| radius * (1.0 + FINE)).collect();
     let stages = stages::<D>(container, radii);
@@ -128,10 +125,7 @@ fn separate<const D: usize>(
     positions: &mut [Vector<D>],
     radii: &[f64],
     tolerance: f64,
-) -> Result<(), ContactError>
-where
-    Dim<D>: Space<D>,
-{
+) -> Result<(), ContactError> {
     let params = ContactParams {
         law: ContactLaw::VelocityCorrection,
         threshold: 0.0,

@@ -9,7 +9,7 @@ mod params;
 mod separate;
 mod sizes;
 
-use gluey_geom::{Dim, Space, Vector};
+use gluey_geom::Vector;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
@@ -38,10 +38,7 @@ pub fn most_random<const D: usize>() -> f64 {
     if D == 2 { 0.78 } else { 0.57 }
 }
 
-impl<const D: usize> Packing<D>
-where
-    Dim<D>: Space<D>,
-{
+impl<const D: usize> Packing<D> {
     /// Places particles in a container. The same parameters give the same particles, bit for bit.
     ///
     /// Above the fraction of freezing (0.49 in 3D, 0.70 in 2D) what comes out of the Monte Carlo moves is a
@@ -125,10 +122,7 @@ fn crystalline<const D: usize>(
     params: &PackingParams,
     radii: Vec<f64>,
     random: &mut ChaCha8Rng,
-) -> Result<Packing<D>, PackingError>
-where
-    Dim<D>: Space<D>,
-{
+) -> Result<Packing<D>, PackingError> {
     let arrangement = params.arrangement;
     let positions = crystal::sites(arrangement, container, radii.len())?;
     let mut packing = Packing { positions, radii };
@@ -153,10 +147,7 @@ fn random_in<const D: usize>(
     params: &PackingParams,
     radii: Vec<f64>,
     random: &mut ChaCha8Rng,
-) -> Result<Packing<D>, PackingError>
-where
-    Dim<D>: Space<D>,
-{
+) -> Result<Packing<D>, PackingError> {
     let gap = params.min_gap * mean(&radii);
     let enlarged: Vec<f64> = radii.iter().map(|a| a + 0.5 * gap).collect();
     let (with_gaps, most) = (fraction(container, &enlarged), most_random::<D>());

@@ -1,6 +1,6 @@
 //! Hard discs and spheres in equilibrium: their correlations are those of the equations of state.
 
-use gluey_geom::{Dim, Space, Vector};
+use gluey_geom::Vector;
 use gluey_suspension::Container;
 use gluey_suspension::packing::{Amount, Arrangement, Packing, PackingParams};
 use gluey_suspension::statistics::Estimate;
@@ -9,10 +9,7 @@ use gluey_suspension::structure::{
 };
 
 /// Contact values of independent arrangements, and their structure factor at small wave numbers.
-fn measure<const D: usize>(fraction: f64, count: usize, samples: u64) -> (Estimate, f64)
-where
-    Dim<D>: Space<D>,
-{
+fn measure<const D: usize>(fraction: f64, count: usize, samples: u64) -> (Estimate, f64) {
     let container = Container::<D>::periodic(&Vector::repeat(1.0));
     let arrangement = Arrangement::Equilibrium { sweep_count: 3000 };
     let params = PackingParams { arrangement, ..PackingParams::new(Amount::Count { fraction, count }) };
@@ -32,10 +29,7 @@ where
     (Estimate::of(&values).expect("values"), factor.bins()[0].s)
 }
 
-fn check<const D: usize>(fraction: f64)
-where
-    Dim<D>: Space<D>,
-{
+fn check<const D: usize>(fraction: f64) {
     let (contact, factor) = measure::<D>(fraction, 500, 10);
     let (exact, limit) = (contact_value::<D>(fraction), compressibility::<D>(fraction));
     println!("{D}D {fraction}: g(2a) = {:.3} +- {:.3}, exact {exact:.3}", contact.mean, contact.half_width);

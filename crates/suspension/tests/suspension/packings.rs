@@ -1,6 +1,6 @@
 //! Arrangements: no overlaps, exact fractions, refusals.
 
-use gluey_geom::{Aabb, Dim, Space, Vector};
+use gluey_geom::{Aabb, Vector};
 use gluey_suspension::Container;
 use gluey_suspension::packing::{
     Amount, Arrangement, LargeShare, Packing, PackingError, PackingParams, Sizes,
@@ -10,10 +10,7 @@ use gluey_suspension::structure::StructureFactor;
 const BRIEF: Arrangement = Arrangement::Equilibrium { sweep_count: 20 };
 
 /// Whether particles are inside, have the fraction, and the smallest gap.
-fn is_right<const D: usize>(container: &Container<D>, params: &PackingParams, fraction: f64) -> Packing<D>
-where
-    Dim<D>: Space<D>,
-{
+fn is_right<const D: usize>(container: &Container<D>, params: &PackingParams, fraction: f64) -> Packing<D> {
     let packing = Packing::new(container, params).expect("room");
     assert!((packing.fraction(container) / fraction - 1.0).abs() < 1e-12, "{params:?}");
     let mean = packing.radii.iter().sum::<f64>() / packing.radii.len() as f64;
@@ -23,10 +20,7 @@ where
     packing
 }
 
-fn random<const D: usize>(dense: f64)
-where
-    Dim<D>: Space<D>,
-{
+fn random<const D: usize>(dense: f64) {
     let bounds = Aabb { lower: Vector::repeat(-1.0), upper: Vector::from_fn(|d, _| [3.0, 2.0, 2.5][d]) };
     let sizes = [
         Sizes::Equal,
@@ -103,10 +97,7 @@ fn two_of_three_numbers_say_how_many() {
     assert!((packing.radii.iter().sum::<f64>() / 38.0 - 0.05).abs() < 1e-15);
 }
 
-fn lattice<const D: usize>(arrangement: Arrangement, edges: Vector<D>, count: usize, densest: f64)
-where
-    Dim<D>: Space<D>,
-{
+fn lattice<const D: usize>(arrangement: Arrangement, edges: Vector<D>, count: usize, densest: f64) {
     for container in
         [Container::periodic(&edges), Container::walled(Aabb { lower: Vector::zeros(), upper: edges })]
     {

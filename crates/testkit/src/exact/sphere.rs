@@ -6,7 +6,7 @@
 //!
 //! `u = w x X + E.X - E.X a^5/r^5 - (5/2) X (X.E.X) (a^3/r^5 - a^5/r^7)`, `p = -5 mu a^3 X.E.X / r^5`.
 
-use gluey_geom::{Dim, Matrix, Space, Spin, Vector};
+use gluey_geom::{Dim, Matrix, Spin, Vector};
 
 use super::StokesSolution;
 
@@ -129,7 +129,7 @@ mod tests {
         let flow = sphere();
         for direction in points::<3>(20) {
             let n = direction.normalize();
-            let spinning = flow.spin.cross(&n);
+            let spinning = Dim::<3>::cross_spin(&flow.spin, &n);
             let at_surface = flow.velocity(&(flow.center + n * (flow.radius * (1.0 + 1e-15))));
             assert!((at_surface - spinning * flow.radius).norm() < 1e-14);
             assert!((flow.velocity(&(flow.center + n * 0.1)) - spinning * 0.1).norm() < 1e-14);

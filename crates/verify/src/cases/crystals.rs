@@ -2,7 +2,7 @@
 
 use std::f64::consts::PI;
 
-use gluey_geom::{Aabb, Dim, Matrix, Space, Twist, Vector};
+use gluey_geom::{Aabb, Matrix, Twist, Vector};
 use gluey_levelset::Ball;
 use gluey_stokes::{Conditions, FlowSolver, Prepared, Refinement, Stress};
 use gluey_testkit::reference::{lattices_of_discs, lattices_of_spheres};
@@ -110,10 +110,7 @@ fn tasks(extent: Extent) -> Vec<Task> {
 }
 
 /// Errors of drag and viscosities, and the cells in a radius.
-fn measure<const D: usize>(method: &Method, crystal: &Crystal, phi: f64) -> Result<Vec<f64>, VerifyError>
-where
-    Dim<D>: Space<D>,
-{
+fn measure<const D: usize>(method: &Method, crystal: &Crystal, phi: f64) -> Result<Vec<f64>, VerifyError> {
     // One body in a unit of volume.
     let count = crystal.sites.len() as f64;
     let radius = radius_of(D, phi);
@@ -160,10 +157,7 @@ where
 fn stress<const D: usize>(
     prepared: &mut Prepared<'_, D>,
     conditions: &Conditions<'_, D>,
-) -> Result<Stress<D>, VerifyError>
-where
-    Dim<D>: Space<D>,
-{
+) -> Result<Stress<D>, VerifyError> {
     Ok(stress_of(&prepared.solve(&conditions.with_stress())?)?.clone())
 }
 

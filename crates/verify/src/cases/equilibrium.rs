@@ -1,7 +1,7 @@
 //! Suspensions in equilibrium: viscosity and settling velocity of many configurations beside those of the
 //! literature.
 
-use gluey_geom::{Aabb, Dim, Lattice, Matrix, Space, Vector, Wrench};
+use gluey_geom::{Aabb, Lattice, Matrix, Vector, Wrench};
 use gluey_levelset::{Ball, Body};
 use gluey_stokes::{Conditions, FlowSolver, Prepared, Refinement, StokesError};
 use gluey_suspension::Container;
@@ -62,10 +62,7 @@ fn tasks(extent: Extent) -> Vec<Task> {
     iproduct!(IN_SHEARED_BOXES, fractions).flat_map(of_fraction).collect()
 }
 
-fn measure<const D: usize>(method: &Method, phi: f64, seed: usize) -> Result<Vec<f64>, VerifyError>
-where
-    Dim<D>: Space<D>,
-{
+fn measure<const D: usize>(method: &Method, phi: f64, seed: usize) -> Result<Vec<f64>, VerifyError> {
     let bodies = bodies::<D>(phi, seed)?;
     let level = LEVELS[D - 2];
     let mesh = Refinement::to_level(level).mesh(Aabb::unit(), [1; D], [true; D], &bodies)?;
@@ -76,10 +73,7 @@ where
     Ok(vec![viscosity, settling])
 }
 
-fn bodies<const D: usize>(phi: f64, seed: usize) -> Result<Vec<Ball<D>>, VerifyError>
-where
-    Dim<D>: Space<D>,
-{
+fn bodies<const D: usize>(phi: f64, seed: usize) -> Result<Vec<Ball<D>>, VerifyError> {
     let container = Container::<D>::periodic(&Vector::repeat(1.0));
     let params = PackingParams {
         arrangement: Arrangement::Equilibrium { sweep_count: SWEEPS },
@@ -95,10 +89,7 @@ where
 
 /// Relative viscosity, the mean over all directions: of the shears in the planes of two axes, and of the
 /// extensions in these.
-fn viscosity<const D: usize>(prepared: &mut Prepared<'_, D>) -> Result<f64, VerifyError>
-where
-    Dim<D>: Space<D>,
-{
+fn viscosity<const D: usize>(prepared: &mut Prepared<'_, D>) -> Result<f64, VerifyError> {
     let planes = (0..D).flat_map(|d| (0..d).map(move |e| (d, e)));
     let [mut shears, mut extensions] = [Vec::new(), Vec::new()];
     for (d, e) in planes {
@@ -118,20 +109,14 @@ where
 fn stress_of_bodies<const D: usize>(
     prepared: &mut Prepared<'_, D>,
     gradient: &Matrix<D>,
-) -> Result<Matrix<D>, VerifyError>
-where
-    Dim<D>: Space<D>,
-{
+) -> Result<Matrix<D>, VerifyError> {
     let flow = prepared.solve(&Conditions::in_linear_flow(gradient).with_stress())?;
     let stress = flow.stress.ok_or(StokesError::Unsupported { what: "stresses of suspensions" })?;
     Ok(stress.of_bodies(1.0))
 }
 
 /// Mean velocity under equal forces, over that of a single sphere, without mean flow; mean over the axes.
-fn settling<const D: usize>(prepared: &mut Prepared<'_, D>, bodies: &[Ball<D>]) -> Result<f64, VerifyError>
-where
-    Dim<D>: Space<D>,
-{
+fn settling<const D: usize>(prepared: &mut Prepared<'_, D>, bodies: &[Ball<D>]) -> Result<f64, VerifyError> {
     let mut velocities = Vec::new();
     for axis in 0..D {
         let unit = Vector::<D>::from_fn(|d, _| if d == axis { 1.0 } else { 0.0 });
@@ -233,10 +218,7 @@ mod tests {
     /// bodies are far from their images.
     #[test]
     fn dilute_suspensions_have_the_coefficients_of_einstein() {
-        fn coefficient<const D: usize>(phi: f64, level: u8) -> f64
-        where
-            Dim<D>: Space<D>,
-        {
+        fn coefficient<const D: usize>(phi: f64, level: u8) -> f64 {
             let volume = if D == 2 { std::f64::consts::PI } else { 4.0 * std::f64::consts::PI / 3.0 };
             let radius = (phi / volume).powf(1.0 / D as f64);
             let place = Vector::from_fn(|d, _| 0.41 + 0.013 * d as f64);

@@ -1,6 +1,6 @@
 //! Flows that the elements hold: found exactly, up to the tolerance of the solver.
 
-use gluey_geom::{Aabb, Dim, Space, Vector};
+use gluey_geom::{Aabb, Vector};
 use gluey_stokes::fem::TreeMesh;
 use gluey_testkit::exact::{PolynomialFlow, StokesSolution};
 use itertools::iproduct;
@@ -77,7 +77,6 @@ type ChannelMeasure = fn(&Method, Channel, f64) -> Result<Vec<f64>, VerifyError>
 
 fn measure<const D: usize>(method: &Method, channel: Channel, tolerance: f64) -> Result<Vec<f64>, VerifyError>
 where
-    Dim<D>: Space<D>,
     PolynomialFlow: StokesSolution<D>,
 {
     let mesh = TreeMesh::refine(Aabb::unit(), [1; D], [false; D], 4, |lower, _, level| {

@@ -1,6 +1,6 @@
 //! A disc or sphere of another viscosity in a linear flow, with the exact velocity on a box around it.
 
-use gluey_geom::{Dim, Matrix, Space};
+use gluey_geom::Matrix;
 use gluey_levelset::Ball;
 use gluey_stokes::{FlowParams, FlowSolver, Formulation, PaperParams};
 use gluey_testkit::convergence_order;
@@ -78,10 +78,7 @@ fn measure<const D: usize>(
     ball: Ball<D>,
     strain: Matrix<D>,
     stresslet: f64,
-) -> Result<Vec<f64>, VerifyError>
-where
-    Dim<D>: Space<D>,
-{
+) -> Result<Vec<f64>, VerifyError> {
     let lattice = around_one_body::<D>(cells);
     let boundary = lattice.without_net_flux(|x| exact.velocity(x));
     let params = PaperParams { viscosity_ratio: ratio, uzawa_steps: 1, ..PaperParams::default() };

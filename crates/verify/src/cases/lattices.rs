@@ -2,7 +2,7 @@
 
 use std::f64::consts::PI;
 
-use gluey_geom::{Aabb, Dim, Space, Twist, Vector};
+use gluey_geom::{Aabb, Twist, Vector};
 use gluey_levelset::Ball;
 use gluey_stokes::{Conditions, FlowSolver, Refinement};
 use gluey_testkit::reference::{lattices_of_discs, lattices_of_spheres};
@@ -60,10 +60,7 @@ fn measure<const D: usize>(
     level: u8,
     phi: f64,
     position: usize,
-) -> Result<Vec<f64>, VerifyError>
-where
-    Dim<D>: Space<D>,
-{
+) -> Result<Vec<f64>, VerifyError> {
     let radius = radius_of(D, phi);
     let center = Vector::repeat(0.5) + shift::<D>(position) * 0.5f64.powi(level.into());
     let ball = [Ball::periodic(center, radius, [Some(1.0); D])];

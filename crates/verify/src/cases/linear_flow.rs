@@ -1,6 +1,6 @@
 //! One disc or sphere in a linear flow, with the exact velocity on a box around it.
 
-use gluey_geom::{Dim, Matrix, Space, Spin};
+use gluey_geom::{Dim, Matrix, Spin};
 use gluey_levelset::Ball;
 use gluey_testkit::convergence_order;
 use gluey_testkit::exact::{InclusionViscosity, StokesSolution};
@@ -78,10 +78,7 @@ fn sphere(method: &'static Method, cells: f64, position: usize) -> Result<Vec<f6
 }
 
 /// The flow far away.
-struct Far<const D: usize>
-where
-    Dim<D>: Space<D>,
-{
+struct Far<const D: usize> {
     strain: Matrix<D>,
     spin: Spin<D>,
 }
@@ -92,10 +89,7 @@ fn measure<const D: usize>(
     exact: &impl StokesSolution<D>,
     ball: Ball<D>,
     far: Far<D>,
-) -> Result<Vec<f64>, VerifyError>
-where
-    Dim<D>: Space<D>,
-{
+) -> Result<Vec<f64>, VerifyError> {
     let lattice = around_one_body::<D>(cells);
     let boundary = lattice.without_net_flux(|x| exact.velocity(x));
     let flow = solve(method, 1e-9, uniform(&lattice)?, &[ball], &boundary)?;

@@ -1,6 +1,6 @@
 //! Orders of convergence to smooth flows without bodies.
 
-use gluey_geom::{Aabb, Dim, Space, Vector};
+use gluey_geom::{Aabb, Vector};
 use gluey_stokes::FlowSolver;
 use gluey_stokes::fem::{MeshError, TreeMesh};
 use gluey_testkit::convergence_order;
@@ -42,7 +42,6 @@ fn tasks(extent: Extent) -> Vec<Task> {
 
 fn task<const D: usize>(method: &'static Method, hanging: bool, level: u8) -> Task
 where
-    Dim<D>: Space<D>,
     PolynomialFlow: StokesSolution<D>,
 {
     let at = [D as f64, f64::from(u8::from(hanging)), 0.5f64.powi(level.into())];
@@ -61,7 +60,6 @@ fn mesh<const D: usize>(hanging: bool, level: u8) -> Result<TreeMesh<D>, MeshErr
 
 fn measure<const D: usize>(method: &Method, mesh: TreeMesh<D>) -> Result<Vec<f64>, VerifyError>
 where
-    Dim<D>: Space<D>,
     PolynomialFlow: StokesSolution<D>,
 {
     let force = |x: &Vector<D>| FLOW.body_force(x);

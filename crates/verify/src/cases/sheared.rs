@@ -1,6 +1,6 @@
 //! Lattices of free bodies in boxes that are sheared.
 
-use gluey_geom::{Dim, Lattice, Space, Vector};
+use gluey_geom::{Dim, Lattice, Vector};
 use gluey_levelset::Ball;
 use gluey_stokes::{Conditions, Flow, FlowSolver};
 use gluey_testkit::reference::{sheared_simple_cubic_lattice, sheared_square_lattice};
@@ -52,10 +52,12 @@ fn tasks(extent: Extent) -> Vec<Task> {
     tasks
 }
 
-fn measure<const D: usize>(method: &Method, level: u8, phi: f64, strain: f64) -> Result<Vec<f64>, VerifyError>
-where
-    Dim<D>: Space<D>,
-{
+fn measure<const D: usize>(
+    method: &Method,
+    level: u8,
+    phi: f64,
+    strain: f64,
+) -> Result<Vec<f64>, VerifyError> {
     let flow = flow::<D>(method, level, phi, strain)?;
     let stress = stress_of(&flow)?;
     let of_body = stress.of_bodies(1.0);
@@ -69,10 +71,7 @@ where
     Ok(vec![viscosity / eta - 1.0, miss / (eta - 1.0), spin - omega, routes])
 }
 
-fn flow<const D: usize>(method: &Method, level: u8, phi: f64, strain: f64) -> Result<Flow<D>, VerifyError>
-where
-    Dim<D>: Space<D>,
-{
+fn flow<const D: usize>(method: &Method, level: u8, phi: f64, strain: f64) -> Result<Flow<D>, VerifyError> {
     let place = Vector::repeat(0.5) + shift::<D>((100.0 * strain) as usize);
     let lattice = Lattice::new([Some(1.0); D]).tilted(strain);
     let ball = [Ball::in_space(&place, radius_of(D, phi), &lattice, 0.0)];

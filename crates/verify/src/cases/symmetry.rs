@@ -1,6 +1,6 @@
 //! What moves with the lattice or is turned with it is computed the same.
 
-use gluey_geom::{Aabb, Dim, Space, Twist, Vector};
+use gluey_geom::{Aabb, Dim, Twist, Vector};
 use gluey_levelset::Ball;
 use gluey_stokes::FlowSolver;
 use gluey_stokes::fem::TreeMesh;
@@ -60,10 +60,7 @@ type SymmetryMeasure = fn(&Method, u8, f64) -> Result<f64, VerifyError>;
 
 /// Largest difference of the resistance matrix of two unequal bodies from its transpose, over its largest
 /// entry.
-fn asymmetry<const D: usize>(method: &Method, level: u8, tolerance: f64) -> Result<f64, VerifyError>
-where
-    Dim<D>: Space<D>,
-{
+fn asymmetry<const D: usize>(method: &Method, level: u8, tolerance: f64) -> Result<f64, VerifyError> {
     let [first, second] = centers::<D>();
     let line = (second - first).normalize();
     let radii = [RADIUS, 1.5 * RADIUS];
@@ -82,10 +79,7 @@ fn centers<const D: usize>() -> [Vector<D>; 2] {
     [first, second]
 }
 
-fn translation<const D: usize>(method: &Method, level: u8, tolerance: f64) -> Result<f64, VerifyError>
-where
-    Dim<D>: Space<D>,
-{
+fn translation<const D: usize>(method: &Method, level: u8, tolerance: f64) -> Result<f64, VerifyError> {
     let periodic = std::array::from_fn(|d| d == 0);
     let twists = |shift: f64| {
         let mut offset = Vector::<D>::zeros();
@@ -98,10 +92,7 @@ where
     Ok(difference(&twists(0.0)?, &twists(3.0 * 0.5f64.powi(level.into()))?))
 }
 
-fn quarter_turn<const D: usize>(method: &Method, level: u8, tolerance: f64) -> Result<f64, VerifyError>
-where
-    Dim<D>: Space<D>,
-{
+fn quarter_turn<const D: usize>(method: &Method, level: u8, tolerance: f64) -> Result<f64, VerifyError> {
     let middle = Vector::<D>::repeat(0.5);
     let twists = |centers: [Vector<D>; 2], flow: &dyn Fn(&Vector<D>) -> Vector<D>| {
         let balls = centers.map(|center| Ball::new(center, RADIUS));
@@ -136,10 +127,7 @@ fn turn_back<const D: usize>(x: &Vector<D>) -> Vector<D> {
     turned
 }
 
-fn difference<const D: usize>(a: &[Twist<D>], b: &[Twist<D>]) -> f64
-where
-    Dim<D>: Space<D>,
-{
+fn difference<const D: usize>(a: &[Twist<D>], b: &[Twist<D>]) -> f64 {
     let of_body = |(a, b): (&Twist<D>, &Twist<D>)| {
         let spin = a.spin - b.spin;
         let spin = largest(Dim::<D>::spin_slice(&spin));

@@ -61,7 +61,7 @@ fn measure(method: &Method, cells: f64, gap: f64, position: usize) -> Result<Vec
     let approach = 1.0 + relative(&strained(PairStrain::Along)?, &along) / distance;
     let tilted = strained(PairStrain::Tilting)?;
     let turning = 1.0 + relative(&tilted, &across) / distance;
-    let spins = [0, 1].map(|k| tilted[k].spin.dot(&side));
+    let spins = [0, 1].map(|k| (0..3).map(|d| tilted[k].spin[d] * side[d]).sum::<f64>());
     let mut mobility = |direction: &Vector<3>| {
         let at_rest = Conditions::at_rest();
         let wrenches = wrenches(&along, gap, direction);

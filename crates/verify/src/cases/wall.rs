@@ -2,7 +2,7 @@
 
 use std::f64::consts::PI;
 
-use gluey_geom::{Dim, Space, Twist, Vector, Wrench};
+use gluey_geom::{Dim, Twist, Vector, Wrench};
 use gluey_levelset::Ball;
 use gluey_stokes::{Conditions, FlowSolver, Refinement};
 use itertools::iproduct;
@@ -128,10 +128,7 @@ fn wrenches<const D: usize>(
     cells: f64,
     distance: f64,
     position: usize,
-) -> Result<[Wrench<D>; 3], VerifyError>
-where
-    Dim<D>: Space<D>,
-{
+) -> Result<[Wrench<D>; 3], VerifyError> {
     let mut center = Vector::repeat(0.5) + shift::<D>(position) * (radius / cells);
     center[1] = distance * radius;
     let body = [Ball::new(center, radius)];

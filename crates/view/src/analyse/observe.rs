@@ -4,7 +4,7 @@ use std::f64::consts::TAU;
 
 use gluey::output::xyz::XyzFrame;
 use gluey_contact::ContactError;
-use gluey_geom::{Dim, Matrix, Space, Vector};
+use gluey_geom::{Matrix, Vector};
 use gluey_suspension::structure::{
     AngularDistribution, Diffusivity, Displacements, GapStatistics, Profile, ProximityNetwork,
     RadialDistribution, StructureFactor,
@@ -42,10 +42,7 @@ pub(super) struct FrameNumbers<const D: usize> {
     pub fabric: Option<Matrix<D>>,
 }
 
-impl<const D: usize> FrameNumbers<D>
-where
-    Dim<D>: Space<D>,
-{
+impl<const D: usize> FrameNumbers<D> {
     /// Measures a frame; gaps up to `reach_over_a` mean radii are contacts.
     pub(super) fn of(frame: &XyzFrame<D>, reach_over_a: f64) -> Result<Self, ContactError> {
         let XyzFrame { time, strain, container, positions, radii, .. } = frame;
@@ -112,10 +109,7 @@ pub(super) struct Distributions<const D: usize> {
     pub rate: f64,
 }
 
-impl<const D: usize> Distributions<D>
-where
-    Dim<D>: Space<D>,
-{
+impl<const D: usize> Distributions<D> {
     /// Measures frames, of which there is at least one.
     pub(super) fn of(frames: &[XyzFrame<D>]) -> Self {
         let first = &frames[0];
@@ -179,28 +173,19 @@ impl<const D: usize> Distributions<D> {
 }
 
 /// Time between frames that are equally far apart.
-fn interval<const D: usize>(frames: &[XyzFrame<D>]) -> Option<f64>
-where
-    Dim<D>: Space<D>,
-{
+fn interval<const D: usize>(frames: &[XyzFrame<D>]) -> Option<f64> {
     let mut steps = frames.windows(2).map(|pair| pair[1].time - pair[0].time);
     let first = steps.next()?;
     (first > 0.0 && steps.all(|step| (step / first - 1.0).abs() < 1e-6)).then_some(first)
 }
 
 /// Rate of shear from a frame to the next one, for the last frame from the one before.
-fn rate_at<const D: usize>(frames: &[XyzFrame<D>], number: usize) -> f64
-where
-    Dim<D>: Space<D>,
-{
+fn rate_at<const D: usize>(frames: &[XyzFrame<D>], number: usize) -> f64 {
     rate(&frames[number.min(frames.len().saturating_sub(2))..])
 }
 
 /// Rate of shear between the first two frames.
-fn rate<const D: usize>(frames: &[XyzFrame<D>]) -> f64
-where
-    Dim<D>: Space<D>,
-{
+fn rate<const D: usize>(frames: &[XyzFrame<D>]) -> f64 {
     match frames {
         [first, second, ..] => (second.strain - first.strain) / (second.time - first.time),
         _ => 0.0,

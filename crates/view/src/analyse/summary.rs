@@ -4,7 +4,6 @@ use std::fmt;
 
 use gluey::rheology::{Mean, RheologyMeans};
 use gluey::shown_to;
-use gluey_geom::{Dim, Space};
 use serde::{Serialize, Serializer};
 
 use super::observe::{Distributions, FrameNumbers};
@@ -38,10 +37,7 @@ impl StructureSummary {
         skipped: usize,
         distributions: &Distributions<D>,
         rheology: Option<RheologyMeans>,
-    ) -> Self
-    where
-        Dim<D>: Space<D>,
-    {
+    ) -> Self {
         let kept = &series[skipped..];
         let mean = |value: &dyn Fn(&FrameNumbers<D>) -> Option<f64>| {
             let values: Vec<f64> = kept.iter().filter_map(value).collect();

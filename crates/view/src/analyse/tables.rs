@@ -1,7 +1,6 @@
 //! The tables, as comma-separated values; lengths in mean radii. A cell without a number is empty.
 
 use gluey::output::line_of;
-use gluey_geom::{Dim, Space};
 use gluey_suspension::structure::GapStatistics;
 
 use super::observe::{Distributions, FrameNumbers};
@@ -12,10 +11,7 @@ const AXES: [char; 3] = ['x', 'y', 'z'];
 pub(super) fn all<const D: usize>(
     series: &[FrameNumbers<D>],
     distributions: &Distributions<D>,
-) -> Vec<(&'static str, String)>
-where
-    Dim<D>: Space<D>,
-{
+) -> Vec<(&'static str, String)> {
     let mut tables = vec![
         ("series.csv", of_series(series)),
         ("g_of_r.csv", radial(distributions)),

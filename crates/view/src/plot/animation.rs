@@ -3,7 +3,6 @@
 use std::path::{Path, PathBuf};
 
 use gluey::output::xyz::XyzFrame;
-use gluey_geom::{Dim, Space};
 use gluey_pictures::{Animation, Canvas, Still};
 use rayon::prelude::*;
 
@@ -46,10 +45,7 @@ fn animated<const D: usize>(
     options: AnimationOptions,
     look: &Look,
     [first, path]: [&Path; 2],
-) -> Result<Vec<u8>, PlotError>
-where
-    Dim<D>: Space<D>,
-{
+) -> Result<Vec<u8>, PlotError> {
     look.check(frames, first)?;
     let is_sheared = frames.iter().any(|frame| frame.strain != 0.0);
     let scene = |frame: &XyzFrame<D>| Scene::of(frame, look, is_sheared);

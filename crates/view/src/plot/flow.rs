@@ -11,7 +11,7 @@ use std::path::{Path, PathBuf};
 use choice::AXES;
 use gluey::case::Case;
 use gluey::output::vtk::{read_fields, read_particles};
-use gluey_geom::{Dim, Particle, Space};
+use gluey_geom::Particle;
 use gluey_pictures::{Canvas, PIXELS_PER_MM, Raster, Stroke, color_scale};
 use gluey_suspension::Container;
 
@@ -59,10 +59,7 @@ pub fn flow(
     Ok((canvas, frame.plots.join(name)))
 }
 
-fn drawn<const D: usize>(frame: &FlowFrame, options: FlowOptions, width: f64) -> Result<Canvas, PlotError>
-where
-    Dim<D>: Space<D>,
-{
+fn drawn<const D: usize>(frame: &FlowFrame, options: FlowOptions, width: f64) -> Result<Canvas, PlotError> {
     let fields = read_fields::<D>(&frame.fields)?;
     let particles = read_particles::<D>(&frame.particles)?;
     let shear = sample::shear(&fields).ok_or_else(|| PlotError::NoCells { path: frame.fields.clone() })?;
@@ -98,10 +95,7 @@ fn circles<const D: usize>(
     container: &Container<D>,
     particles: &[Particle<D>],
     plane: &PicturePlane<D>,
-) -> Vec<((f64, f64), f64)>
-where
-    Dim<D>: Space<D>,
-{
+) -> Vec<((f64, f64), f64)> {
     let mut circles = Vec::new();
     for particle in particles {
         let own = container.wrapped(&particle.pose.position);

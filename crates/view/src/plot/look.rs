@@ -5,7 +5,7 @@ use std::path::Path;
 use std::str::FromStr;
 
 use gluey::output::xyz::XyzFrame;
-use gluey_geom::{Dim, Space, Vector};
+use gluey_geom::Vector;
 use gluey_suspension::for_each_pair;
 
 use super::error::PlotError;
@@ -92,10 +92,7 @@ pub struct Look {
 impl Look {
     /// The number behind the colour of each particle: from 0 on, or for gaps from 0 (none) to 1 (a mean
     /// radius).
-    pub(super) fn measures<const D: usize>(&self, frame: &XyzFrame<D>) -> Vec<f64>
-    where
-        Dim<D>: Space<D>,
-    {
+    pub(super) fn measures<const D: usize>(&self, frame: &XyzFrame<D>) -> Vec<f64> {
         match self.coloring {
             Coloring::ContactForce => {
                 frame.contact_forces.iter().flatten().map(|force| force.norm()).collect()
@@ -116,10 +113,7 @@ impl Look {
     }
 
     /// Checks that frames, which were read from files such as `path`, tell what colours are to show.
-    pub(super) fn check<const D: usize>(&self, frames: &[XyzFrame<D>], path: &Path) -> Result<(), PlotError>
-    where
-        Dim<D>: Space<D>,
-    {
+    pub(super) fn check<const D: usize>(&self, frames: &[XyzFrame<D>], path: &Path) -> Result<(), PlotError> {
         let is_told = |frame: &XyzFrame<D>| frame.contact_forces.is_some();
         match self.coloring != Coloring::ContactForce || frames.iter().all(is_told) {
             true => Ok(()),
@@ -149,10 +143,10 @@ impl Look {
 
 /// Two particles, the way from the first to the image of the second, and their gap in mean radii, where it is
 /// at most `reach`.
-pub(super) fn near_pairs<const D: usize>(frame: &XyzFrame<D>, reach: f64) -> Vec<([usize; 2], Vector<D>, f64)>
-where
-    Dim<D>: Space<D>,
-{
+pub(super) fn near_pairs<const D: usize>(
+    frame: &XyzFrame<D>,
+    reach: f64,
+) -> Vec<([usize; 2], Vector<D>, f64)> {
     let radii = &frame.radii;
     let mean = radii.iter().sum::<f64>() / radii.len().max(1) as f64;
     let range = 2.0 * radii.iter().copied().fold(0.0, f64::max) + reach * mean;

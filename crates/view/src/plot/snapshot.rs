@@ -5,7 +5,7 @@ use std::str::FromStr;
 
 use gluey::output::name_of;
 use gluey::output::xyz::XyzFrame;
-use gluey_geom::{Dim, Space, Vector};
+use gluey_geom::Vector;
 use gluey_pictures::{Ball, Canvas, PIXELS_PER_MM, Rgb, Stroke, color_scale};
 use gluey_suspension::Container;
 
@@ -85,10 +85,7 @@ fn drawn<const D: usize>(
     look: &Look,
     file: &Path,
     width: f64,
-) -> Result<Canvas, PlotError>
-where
-    Dim<D>: Space<D>,
-{
+) -> Result<Canvas, PlotError> {
     look.check(frames, file)?;
     let is_sheared = frames[0].strain != 0.0 || frames[0].time == 0.0;
     Ok(Scene::of(&frames[0], look, is_sheared).draw_alone(width))
@@ -159,10 +156,7 @@ pub(super) struct Scene {
 
 impl Scene {
     /// What is seen of this frame; the strain is told of runs that are sheared.
-    pub fn of<const D: usize>(frame: &XyzFrame<D>, look: &Look, is_sheared: bool) -> Self
-    where
-        Dim<D>: Space<D>,
-    {
+    pub fn of<const D: usize>(frame: &XyzFrame<D>, look: &Look, is_sheared: bool) -> Self {
         // The same box, as upright as its images allow.
         let container = frame.container.tilted(frame.container.lattice().reduced().tilt());
         let measures = look.measures(frame);
@@ -301,10 +295,7 @@ fn links<const D: usize>(
     container: &Container<D>,
     view: Viewpoint,
     reach: f64,
-) -> Vec<[[f64; 3]; 2]>
-where
-    Dim<D>: Space<D>,
-{
+) -> Vec<[[f64; 3]; 2]> {
     let mut links = Vec::new();
     for ([first, second], arm, _) in near_pairs(frame, reach) {
         let [from, to] = [first, second].map(|i| container.wrapped(&frame.positions[i]));

@@ -1,7 +1,7 @@
 //! The projection of shapes as the core of the crate sees it: scaled rows of the points of contact, and where
 //! they are after each pass.
 
-use gluey_geom::{Dim, Space, Twist};
+use gluey_geom::Twist;
 
 use super::{FIRST_PASSES, ShapeProjection};
 use crate::delassus::{ScaledDelassus, scale_rows};
@@ -10,10 +10,7 @@ use crate::shape::Shape;
 use crate::shape::points::{OwnDrag, PointRow};
 use crate::solver::{SolveFailure, SolveReport};
 
-impl<const D: usize, S: Shape<D>> ShapeProjection<'_, D, S>
-where
-    Dim<D>: Space<D>,
-{
+impl<const D: usize, S: Shape<D>> ShapeProjection<'_, D, S> {
     /// The rows of all points of contact, and their scales.
     fn scaled_rows(&self) -> (Vec<PointRow<D>>, Vec<f64>) {
         let mut rows: Vec<PointRow<D>> = self.points.iter().map(|point| self.row(point)).collect();
@@ -29,10 +26,7 @@ where
     }
 }
 
-impl<const D: usize, S: Shape<D>> Linearised for ShapeProjection<'_, D, S>
-where
-    Dim<D>: Space<D>,
-{
+impl<const D: usize, S: Shape<D>> Linearised for ShapeProjection<'_, D, S> {
     fn begin(&mut self) {
         self.moved.fill(Twist::default());
         self.turn_frames();

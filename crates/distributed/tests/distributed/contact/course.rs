@@ -5,7 +5,7 @@ use gluey_contact::{
     PairContact, StepGeometry, Wall, WithFixed,
 };
 use gluey_distributed::{ContactLoad, SharedContact};
-use gluey_geom::{Dim, Space, Twist, Vector};
+use gluey_geom::{Twist, Vector};
 use gluey_testkit::packing::Packing;
 
 use crate::support::on_ranks;
@@ -41,10 +41,7 @@ pub struct Setting<const D: usize> {
 
 /// What became of them.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Course<const D: usize>
-where
-    Dim<D>: Space<D>,
-{
+pub struct Course<const D: usize> {
     pub positions: Vec<Vector<D>>,
     /// Velocities of the last step.
     pub velocities: Vec<Vector<D>>,
@@ -56,10 +53,7 @@ where
 }
 
 /// A model of contact, alone or shared.
-pub trait Model<const D: usize>: ContactModel<D>
-where
-    Dim<D>: Space<D>,
-{
+pub trait Model<const D: usize>: ContactModel<D> {
     fn step(
         &mut self,
         step: &StepGeometry<'_, D>,
@@ -67,10 +61,7 @@ where
     ) -> Result<(ContactReport, ContactLoad), ContactError>;
 }
 
-impl<const D: usize> Model<D> for PairContact<D, WithFixed>
-where
-    Dim<D>: Space<D>,
-{
+impl<const D: usize> Model<D> for PairContact<D, WithFixed> {
     fn step(
         &mut self,
         step: &StepGeometry<'_, D>,
@@ -80,10 +71,7 @@ where
     }
 }
 
-impl<const D: usize> Model<D> for SharedContact<'_, D>
-where
-    Dim<D>: Space<D>,
-{
+impl<const D: usize> Model<D> for SharedContact<'_, D> {
     fn step(
         &mut self,
         step: &StepGeometry<'_, D>,
@@ -126,10 +114,7 @@ pub fn floor_and_ceiling<const D: usize>(domain: Domain<D>, side: f64) -> Domain
     domain.with_wall(floor).with_wall(Wall { normal: -up, offset: -side - RADIUS, speed: 0.0 })
 }
 
-impl<const D: usize> Setting<D>
-where
-    Dim<D>: Space<D>,
-{
+impl<const D: usize> Setting<D> {
     pub fn alone(&self) -> PairContact<D, WithFixed> {
         let mut contact =
             PairContact::with_mobility(self.params.clone(), WithFixed::new(self.held.iter().copied()))
@@ -216,10 +201,7 @@ pub struct Differences {
 }
 
 /// How far a course is from another one with the same contacts.
-pub fn differences<const D: usize>(one: &Course<D>, other: &Course<D>) -> Differences
-where
-    Dim<D>: Space<D>,
-{
+pub fn differences<const D: usize>(one: &Course<D>, other: &Course<D>) -> Differences {
     let names = |course: &Course<D>| course.contacts.iter().map(|contact| contact.pair).collect::<Vec<_>>();
     assert_eq!(names(one), names(other), "the contacts are the same");
     assert_eq!(one.reports.len(), other.reports.len());

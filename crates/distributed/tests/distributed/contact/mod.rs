@@ -5,7 +5,7 @@ mod course;
 use gluey_contact::{
     ContactError, ContactLaw, ContactParams, ContactState, Domain, PairKey, PairState, Partner, Wall,
 };
-use gluey_geom::{Dim, Space, Vector};
+use gluey_geom::Vector;
 
 use self::course::{Course, RADIUS, SIZES, Setting, consistent, differences, floor_and_ceiling, packed};
 
@@ -13,10 +13,7 @@ use self::course::{Course, RADIUS, SIZES, Setting, consistent, differences, floo
 type Limits = [f64; 3];
 
 /// Ranks take the particles where one rank does, and to the same bits each time.
-fn ranks_are_as_one<const D: usize>(what: &str, setting: &Setting<D>, limits: Limits) -> Course<D>
-where
-    Dim<D>: Space<D>,
-{
+fn ranks_are_as_one<const D: usize>(what: &str, setting: &Setting<D>, limits: Limits) -> Course<D> {
     let serial = setting.run(&mut setting.alone());
     assert_eq!(serial.error, None, "{what}");
     assert_eq!(setting.on(1), serial, "{what}: one rank does what a process without ranks does");
@@ -39,10 +36,7 @@ where
 
 /// In space, between walls, in a channel, in a box that is sheared for ever; with particles that are held,
 /// through a reversal.
-fn suspensions<const D: usize>(count: usize, fraction: f64, limits: [Limits; 4])
-where
-    Dim<D>: Space<D>,
-{
+fn suspensions<const D: usize>(count: usize, fraction: f64, limits: [Limits; 4]) {
     let (open, side) = packed::<D>(count, fraction);
     let of_x = |d: usize| (d != 1).then_some(side);
     let channel = (0..D).filter_map(|d| Some((d, of_x(d)?)));
@@ -84,10 +78,7 @@ fn spheres_touch_as_on_one_rank() {
 }
 
 /// Most pairs are in one island, which all ranks have rows of; none has much more than its share.
-fn thousands<const D: usize>(count: usize, fraction: f64, limits: Limits)
-where
-    Dim<D>: Space<D>,
-{
+fn thousands<const D: usize>(count: usize, fraction: f64, limits: Limits) {
     let (open, side) = packed::<D>(count, fraction);
     let domain = Domain::periodic(&Vector::repeat(side));
     let sheared = Setting { domain, sizes: [1.0; 3], steps: 10, strength: 0.0, ..open };
@@ -116,10 +107,7 @@ fn thousands_of_spheres_are_shared() {
 }
 
 /// A line of particles that touch, pressed together.
-fn chain<const D: usize>(count: usize) -> Setting<D>
-where
-    Dim<D>: Space<D>,
-{
+fn chain<const D: usize>(count: usize) -> Setting<D> {
     let (setting, _) = packed::<D>(200, 0.2);
     let place = |k: usize| Vector::from_fn(|d, _| [k as f64, 0.01 * (k as f64).sin(), 0.0][d]);
     Setting {
@@ -132,10 +120,7 @@ where
 }
 
 /// The chain between walls of which one comes nearer: infeasible if the other stays.
-fn pressed<const D: usize>(count: usize, speeds: [f64; 2]) -> Setting<D>
-where
-    Dim<D>: Space<D>,
-{
+fn pressed<const D: usize>(count: usize, speeds: [f64; 2]) -> Setting<D> {
     let along = Vector::<D>::from_fn(|d, _| f64::from(u8::from(d == 0)));
     let [left, right] = [-RADIUS, RADIUS - count as f64];
     let domain = Domain::default()
@@ -144,10 +129,7 @@ where
     Setting { domain, steps: 1, ..chain(count) }
 }
 
-fn a_chain_spans_all_ranks<const D: usize>(limits: Limits)
-where
-    Dim<D>: Space<D>,
-{
+fn a_chain_spans_all_ranks<const D: usize>(limits: Limits) {
     let pushed = pressed::<D>(60, [1.0, -1.0]);
     let serial = ranks_are_as_one("chain", &pushed, limits);
     assert!(serial.contacts.len() >= 60, "{}", serial.contacts.len());
@@ -164,10 +146,7 @@ fn a_chain_of_touching_particles_spans_all_ranks() {
 }
 
 /// All ranks say of a failure what one rank says; velocities (see `Setting::run`) and memory are as before.
-fn all_fail<const D: usize>(what: &str, setting: &Setting<D>) -> ContactError
-where
-    Dim<D>: Space<D>,
-{
+fn all_fail<const D: usize>(what: &str, setting: &Setting<D>) -> ContactError {
     let serial = setting.run(&mut setting.alone());
     let error = serial.error.clone().unwrap();
     for size in SIZES {
@@ -192,10 +171,7 @@ fn what_is_infeasible_is_so_on_all_ranks() {
 }
 
 /// The chain without bends, so that it cannot buckle.
-fn straight<const D: usize>(mut setting: Setting<D>) -> Setting<D>
-where
-    Dim<D>: Space<D>,
-{
+fn straight<const D: usize>(mut setting: Setting<D>) -> Setting<D> {
     setting.positions.iter_mut().for_each(|x| x[1] = 0.0);
     setting
 }

@@ -10,8 +10,6 @@ use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 use std::thread::{self, JoinHandle};
 use std::time::Duration;
 
-use gluey_geom::{Dim, Space};
-
 use super::{VtkFrame, VtkWriter};
 use crate::output::FileError;
 
@@ -45,10 +43,7 @@ impl Drop for Passage {
     }
 }
 
-enum FrameMessage<const D: usize>
-where
-    Dim<D>: Space<D>,
-{
+enum FrameMessage<const D: usize> {
     /// A frame, and what ends when it is on disk, or given up.
     VtkFrame(Box<VtkFrame<D>>, Passage),
     /// An answer is due when all frames before are on disk.
@@ -57,10 +52,7 @@ where
 
 /// A [`VtkWriter`] in a thread of its own; frames keep their order.
 #[derive(Debug)]
-pub(crate) struct FrameWriter<const D: usize>
-where
-    Dim<D>: Space<D>,
-{
+pub(crate) struct FrameWriter<const D: usize> {
     folder: PathBuf,
     on_their_way: OnTheirWay,
     queue: Option<SyncSender<FrameMessage<D>>>,
@@ -68,10 +60,7 @@ where
     thread: Option<JoinHandle<Result<(), FileError>>>,
 }
 
-impl<const D: usize> FrameWriter<D>
-where
-    Dim<D>: Space<D>,
-{
+impl<const D: usize> FrameWriter<D> {
     /// Starts the thread; `on_their_way` counts its frames.
     pub fn new(writer: VtkWriter, on_their_way: OnTheirWay) -> Result<Self, FileError> {
         let folder = writer.folder.clone();
@@ -121,10 +110,7 @@ where
     }
 }
 
-impl<const D: usize> Drop for FrameWriter<D>
-where
-    Dim<D>: Space<D>,
-{
+impl<const D: usize> Drop for FrameWriter<D> {
     /// Frames on their way are written, also when the run has failed otherwise.
     fn drop(&mut self) {
         self.queue = None;
@@ -135,10 +121,10 @@ where
     }
 }
 
-fn serve<const D: usize>(mut writer: VtkWriter, messages: Receiver<FrameMessage<D>>) -> Result<(), FileError>
-where
-    Dim<D>: Space<D>,
-{
+fn serve<const D: usize>(
+    mut writer: VtkWriter,
+    messages: Receiver<FrameMessage<D>>,
+) -> Result<(), FileError> {
     for message in messages {
         match message {
             FrameMessage::VtkFrame(frame, _passage) => writer.write(&frame)?,

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use gluey_geom::{Dim, Particle, Space, Vector};
+use gluey_geom::{Particle, Vector};
 use gluey_motion::Fields;
 use thiserror::Error;
 use vtkio::Vtk;
@@ -90,10 +90,7 @@ fn fields_of<const D: usize>(grid: &FileGrid) -> Result<Fields<D>, VtkReadError>
 ///
 /// # Errors
 /// If the file cannot be read.
-pub fn read_particles<const D: usize>(path: &Path) -> Result<Vec<Particle<D>>, VtkReadError>
-where
-    Dim<D>: Space<D>,
-{
+pub fn read_particles<const D: usize>(path: &Path) -> Result<Vec<Particle<D>>, VtkReadError> {
     let grid = FileGrid::read(path)?;
     let centers = grid.vectors::<D>(grid.piece.points.cast_into(), "points")?;
     let (radii, image) = (grid.scalars("radius")?, grid.scalars("image")?);

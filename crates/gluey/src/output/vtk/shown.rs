@@ -1,6 +1,6 @@
 //! Particles as a picture shows them: brought into a periodic box, with the images that reach into it.
 
-use gluey_geom::{Dim, Particle, Space, Vector};
+use gluey_geom::{Particle, Vector};
 use gluey_suspension::Container;
 
 /// A box whose particles are shown in it, and how fast its images slide.
@@ -27,10 +27,10 @@ pub(super) struct Shown<const D: usize> {
 
 /// All particles in their order, then the images that reach into the box. Without a box all are where they
 /// are.
-pub(super) fn shown<const D: usize>(particles: &[Particle<D>], in_box: Option<&ShownBox<D>>) -> Vec<Shown<D>>
-where
-    Dim<D>: Space<D>,
-{
+pub(super) fn shown<const D: usize>(
+    particles: &[Particle<D>],
+    in_box: Option<&ShownBox<D>>,
+) -> Vec<Shown<D>> {
     let places = particles.iter().enumerate().map(|(particle, Particle { pose, .. })| Shown {
         particle,
         center: pose.position,
@@ -66,10 +66,7 @@ mod tests {
     use super::*;
 
     /// Whatever is in the box is covered by a ball that is shown there, and no ball is shown twice.
-    fn is_whole<const D: usize>()
-    where
-        Dim<D>: Space<D>,
-    {
+    fn is_whole<const D: usize>() {
         let container = Container::<D>::periodic(&Vector::from_fn(|d, _| [1.0, 0.8, 1.2][d])).tilted(2.3);
         let in_box = ShownBox { container, slide: 0.5 };
         let number = |k: usize| (0.5 + k as f64 * 0.754_877_666).fract();

@@ -4,7 +4,7 @@ use std::io::Read;
 use std::path::{Path, PathBuf};
 
 use flate2::read::GzDecoder;
-use gluey_geom::{Aabb, Dim, Space, Vector};
+use gluey_geom::{Aabb, Vector};
 use gluey_suspension::Container;
 use thiserror::Error;
 
@@ -67,10 +67,7 @@ pub fn dimension(path: &Path, text: &str) -> Result<usize, XyzError> {
     }
 }
 
-impl<const D: usize> XyzFrame<D>
-where
-    Dim<D>: Space<D>,
-{
+impl<const D: usize> XyzFrame<D> {
     /// Reads a frame; `path` is what errors call it.
     pub fn parse(path: &Path, text: &str) -> Result<Self, XyzError> {
         let lines = FrameLines { path, lines: text.lines().collect() };

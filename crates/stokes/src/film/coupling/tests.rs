@@ -16,20 +16,14 @@ fn pair<const D: usize>(radii: [f64; 2], gap: f64) -> [Ball<D>; 2] {
     [Ball::new(middle - n * radii[0], radii[0]), Ball::new(middle + n * (radii[1] + gap), radii[1])]
 }
 
-fn space_of<const D: usize>(bodies: &[Ball<D>]) -> VelocitySpace<D>
-where
-    Dim<D>: Space<D>,
-{
+fn space_of<const D: usize>(bodies: &[Ball<D>]) -> VelocitySpace<D> {
     let mesh = TreeMesh::uniform(Aabb::unit(), [1; D], [false; D], 2).unwrap();
     let discretisation = Discretisation::new(mesh);
     let nowhere = vec![None; discretisation.velocity.node_count()];
     VelocitySpace::around_surfaces(&discretisation, bodies, &nowhere, Vec::new())
 }
 
-fn coupling<const D: usize>(bodies: &[Ball<D>], cell_size: f64) -> (VelocitySpace<D>, FilmCoupling<D>)
-where
-    Dim<D>: Space<D>,
-{
+fn coupling<const D: usize>(bodies: &[Ball<D>], cell_size: f64) -> (VelocitySpace<D>, FilmCoupling<D>) {
     coupling_with(bodies, cell_size, Vec::new())
 }
 
@@ -37,10 +31,7 @@ fn coupling_with<const D: usize>(
     bodies: &[Ball<D>],
     cell_size: f64,
     flows: Vec<FilmFlow<D>>,
-) -> (VelocitySpace<D>, FilmCoupling<D>)
-where
-    Dim<D>: Space<D>,
-{
+) -> (VelocitySpace<D>, FilmCoupling<D>) {
     let space = space_of(bodies);
     let heights = Lubrication::Deficit.heights::<D>(cell_size);
     let films = thin_films(bodies, &Aabb::unit(), &heights);
@@ -50,10 +41,7 @@ where
 }
 
 /// `s B V` for twists.
-fn motions<const D: usize>(bodies: &[Ball<D>], cell_size: f64, twists: &[Twist<D>]) -> Vec<f64>
-where
-    Dim<D>: Space<D>,
-{
+fn motions<const D: usize>(bodies: &[Ball<D>], cell_size: f64, twists: &[Twist<D>]) -> Vec<f64> {
     let (space, coupling) = coupling(bodies, cell_size);
     let (mut x, mut z) = (vec![0.0; space.dim()], vec![0.0; coupling.dim()]);
     twists.iter().enumerate().for_each(|(body, twist)| space.set_twist(&mut x, body, twist));
@@ -63,19 +51,13 @@ where
     z
 }
 
-fn spin<const D: usize>() -> Spin<D>
-where
-    Dim<D>: Space<D>,
-{
+fn spin<const D: usize>() -> Spin<D> {
     let mut spin = Dim::<D>::zero_spin();
     (0..Dim::<D>::ROT).for_each(|k| spin[k] = 0.3 - 0.5 * k as f64);
     spin
 }
 
-fn moving_as_one_is_free<const D: usize>()
-where
-    Dim<D>: Space<D>,
-{
+fn moving_as_one_is_free<const D: usize>() {
     let (bodies, cell_size) = (pair::<D>([0.07, 0.11], 0.004), 0.02);
     let velocity = Vector::<D>::from_fn(|d, _| 0.4 - 0.3 * d as f64);
     let rigid = bodies.map(|body| Twist {
@@ -99,10 +81,7 @@ fn a_pair_that_moves_as_one_has_no_force() {
 }
 
 /// `B^T R B` in `(U_1, w_1, U_2, w_2)`.
-fn resistance<const D: usize>(bodies: &[Ball<D>], cell_size: f64) -> DMatrix<f64>
-where
-    Dim<D>: Space<D>,
-{
+fn resistance<const D: usize>(bodies: &[Ball<D>], cell_size: f64) -> DMatrix<f64> {
     let count = bodies.len() * Dim::<D>::RIGID;
     let columns: Vec<Vec<f64>> = (0..count)
         .map(|k| {
@@ -159,10 +138,7 @@ fn spheres_resist_as_jeffrey_and_onishi_say() {
     }
 }
 
-fn forces_dissipate<const D: usize>()
-where
-    Dim<D>: Space<D>,
-{
+fn forces_dissipate<const D: usize>() {
     let near_wall = Ball::new(Vector::<D>::from_fn(|d, _| if d == 1 { 0.055 } else { 0.4 }), 0.05);
     let bodies = [pair::<D>([0.07, 0.11], 0.004), [near_wall; 2]].concat()[..3].to_vec();
     let (space, coupling) = coupling(&bodies, 0.02);
@@ -192,10 +168,7 @@ fn forces_are_those_of_the_rows_and_opposite() {
 }
 
 /// Forces that were kept are those of the same films, and of no other ones.
-fn kept_forces_come_back<const D: usize>()
-where
-    Dim<D>: Space<D>,
-{
+fn kept_forces_come_back<const D: usize>() {
     let flow = FilmFlow {
         nodes: Vec::new(),
         boundary: Vec::new(),

@@ -16,7 +16,6 @@
 //! A rigid motion costs the solid nothing, so what it leaves is the fluid's stress only: rounding errors of
 //! the motion are not multiplied by the solid's viscosity.
 
-use gluey_geom::{Dim, Space};
 use gluey_linalg::{LinOp, Preconditioner, vector};
 
 use super::multigrid::SolidMultigrid;
@@ -50,10 +49,7 @@ impl<const D: usize> CycleLevels<'_, D> {
 
 /// The correction of the velocity cycle for the penalised solid: the approximate inverse on its nodes, the
 /// sweeps, and the operators that give the residuals between them.
-pub struct PenalisedCorrection<const D: usize>
-where
-    Dim<D>: Space<D>,
-{
+pub struct PenalisedCorrection<const D: usize> {
     cycle: SolidMultigrid<D>,
     /// The cycle's unknowns among the reduced velocities.
     positions: Vec<u32>,
@@ -78,10 +74,7 @@ where
     r: Vec<f64>,
 }
 
-impl<const D: usize> PenalisedCorrection<D>
-where
-    Dim<D>: Space<D>,
-{
+impl<const D: usize> PenalisedCorrection<D> {
     /// For the nodes named in `touched`, which in `rigid` move with their bodies.
     pub fn new(
         elements: &Elements<'_, D>,
@@ -147,10 +140,7 @@ where
     }
 }
 
-impl<const D: usize> Correction for PenalisedCorrection<D>
-where
-    Dim<D>: Space<D>,
-{
+impl<const D: usize> Correction for PenalisedCorrection<D> {
     fn apply(&mut self, r: &[f64], z: &mut [f64], levels: &mut dyn FnMut(&mut [f64], &mut [f32])) {
         z.fill(0.0);
         match &mut self.film {
@@ -196,10 +186,7 @@ struct SolidInverse<const D: usize> {
     swept: Vec<bool>,
 }
 
-impl<const D: usize> SolidInverse<D>
-where
-    Dim<D>: Space<D>,
-{
+impl<const D: usize> SolidInverse<D> {
     fn factorised(elements: &Elements<'_, D>, block: &[bool]) -> Result<Self, StokesError> {
         let assembled = assemble_viscous_on(elements, |node| block[node])?;
         Ok(Self {

@@ -15,7 +15,7 @@ mod uzawa;
 use gluey_fem::Evaluator;
 use std::sync::Arc;
 
-use gluey_geom::{Dim, Space, Twist, Wrench};
+use gluey_geom::{Twist, Wrench};
 use gluey_levelset::{Ball, Ramp, ViscosityLaw};
 use gluey_linalg::{ChebyshevParams, vector};
 
@@ -46,10 +46,7 @@ impl<const D: usize> Paper<D> {
     }
 }
 
-impl<const D: usize> Method<D> for Paper<D>
-where
-    Dim<D>: Space<D>,
-{
+impl<const D: usize> Method<D> for Paper<D> {
     fn discretised(
         &self,
         discretisation: &Discretisation<D>,
@@ -84,10 +81,7 @@ struct PenalisedSolid<const D: usize> {
     matrices: Arc<PointMatrices<D>>,
 }
 
-impl<const D: usize> Rigidity<D> for PenalisedSolid<D>
-where
-    Dim<D>: Space<D>,
-{
+impl<const D: usize> Rigidity<D> for PenalisedSolid<D> {
     fn twists(&self, problem: &Problem<D>, velocity: &[f64]) -> Result<Vec<Twist<D>>, StokesError> {
         let (discretisation, bodies) = (problem.discretisation(), &problem.bodies);
         match self.params.particle_velocity {

@@ -1,13 +1,10 @@
 //! The rigid motion closest to a velocity field in a weighted mean.
 
-use gluey_geom::{Dim, Matrix, Space, Spin, Twist, Vector, Wrench};
+use gluey_geom::{Dim, Matrix, Spin, Twist, Vector, Wrench};
 
 /// Weighted sums over a body.
 #[derive(Clone, Debug)]
-pub struct BodyMoments<const D: usize>
-where
-    Dim<D>: Space<D>,
-{
+pub struct BodyMoments<const D: usize> {
     mass: f64,
     momentum: Vector<D>,
     first: Vector<D>,
@@ -15,10 +12,7 @@ where
     angular: Spin<D>,
 }
 
-impl<const D: usize> BodyMoments<D>
-where
-    Dim<D>: Space<D>,
-{
+impl<const D: usize> BodyMoments<D> {
     /// No weight.
     pub fn new() -> Self {
         Self {
@@ -67,10 +61,7 @@ where
 }
 
 /// Solves `J w = l` with `J = tr(S) 1 - S`, if that is positive definite.
-fn solve_inertia<const D: usize>(second: &Matrix<D>, angular: &Spin<D>) -> Option<Spin<D>>
-where
-    Dim<D>: Space<D>,
-{
+fn solve_inertia<const D: usize>(second: &Matrix<D>, angular: &Spin<D>) -> Option<Spin<D>> {
     let rot = Dim::<D>::ROT;
     let inertia = nalgebra::DMatrix::from_fn(rot, rot, |i, j| {
         let diagonal = if i == j { second.trace() } else { 0.0 };

@@ -8,7 +8,6 @@
 
 use gluey_fem::Evaluator;
 use gluey_fem::element::{multi_index, values_1d};
-use gluey_geom::{Dim, Space};
 use gluey_linalg::{
     Chebyshev, ChebyshevParams, DirectSpd, Guess, LinOp, Ordering, Preconditioner, Prolongation,
     SchwarzPatches, SparseMatrix, SymmetricBlockMatrix, vector,
@@ -44,10 +43,7 @@ struct Smoother<const D: usize> {
     chebyshev: Chebyshev<f64>,
 }
 
-impl<const D: usize> SolidMultigrid<D>
-where
-    Dim<D>: Space<D>,
-{
+impl<const D: usize> SolidMultigrid<D> {
     /// The factorisation of a matrix in place of a cycle.
     pub fn factorised(matrix: &SparseMatrix, order: &[usize]) -> Result<Self, StokesError> {
         Ok(Self { coarser: Vec::new(), direct: factorised(matrix, Ordering::Custom(order))? })
@@ -79,10 +75,7 @@ where
     }
 }
 
-impl<const D: usize> Preconditioner<f64> for SolidMultigrid<D>
-where
-    Dim<D>: Space<D>,
-{
+impl<const D: usize> Preconditioner<f64> for SolidMultigrid<D> {
     fn apply(&mut self, b: &[f64], x: &mut [f64]) {
         if self.coarser.is_empty() {
             return self.direct.apply(b, x);
@@ -141,10 +134,7 @@ impl<const D: usize> Coarse<D> {
     }
 }
 
-impl<const D: usize> Smoother<D>
-where
-    Dim<D>: Space<D>,
-{
+impl<const D: usize> Smoother<D> {
     fn new(matrix: &SymmetricBlockMatrix<D>, nodes: &NumberedNodes<'_, D>) -> Result<Self, StokesError> {
         let diagonal = matrix.diagonal().iter().map(|d| 1.0 / d).collect();
         let patches = SchwarzPatches::new(matrix, nodes.cells(), diagonal);
@@ -159,10 +149,7 @@ where
 }
 
 /// Adds to `x` the correction of the coarser levels for the residual `r`.
-fn correct<const D: usize>(levels: &mut [Coarse<D>], direct: &mut DirectSpd, r: &[f64], x: &mut [f64])
-where
-    Dim<D>: Space<D>,
-{
+fn correct<const D: usize>(levels: &mut [Coarse<D>], direct: &mut DirectSpd, r: &[f64], x: &mut [f64]) {
     let Some((level, coarser)) = levels.split_first_mut() else { return };
     level.prolongation.restrict::<D>(r, &mut level.b);
     match &mut level.smoothed {

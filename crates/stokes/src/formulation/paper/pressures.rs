@@ -12,17 +12,13 @@
 
 use gluey_fem::ReferenceMatrices;
 use gluey_fem::element::multi_index;
-use gluey_geom::{Dim, Space};
 use gluey_linalg::{BlockError, DenseSymmetric};
 use nalgebra::DMatrix;
 
 /// See [`crate::operator::AddedViscosity::pressure_matrices`].
 pub fn pressure_matrices<const D: usize>(
     cells: &mut dyn Iterator<Item = (f64, f64, Option<&[f64]>)>,
-) -> Result<Vec<Option<Vec<f64>>>, BlockError>
-where
-    Dim<D>: Space<D>,
-{
+) -> Result<Vec<Option<Vec<f64>>>, BlockError> {
     let mut schur = CellSchur::<D>::new()?;
     let factor = mass_factor(&schur.unit, &schur.reference.pressure_mass);
     let m = ReferenceMatrices::<D>::PRESSURE;
@@ -59,10 +55,7 @@ struct CellSchur<const D: usize> {
     saddle: DenseSymmetric,
 }
 
-impl<const D: usize> CellSchur<D>
-where
-    Dim<D>: Space<D>,
-{
+impl<const D: usize> CellSchur<D> {
     fn new() -> Result<Self, BlockError> {
         let (reference, rigid) = (ReferenceMatrices::<D>::new(), rigid_projector::<D>());
         let mut new = Self { unit: Vec::new(), saddle: DenseSymmetric::default(), reference, rigid };
@@ -130,10 +123,7 @@ mod tests {
 
     /// A constant pressure drives the expansion `v = x / (2 eta)`:
     /// `2 int div v - 2 eta int eps:eps = D V / (2 eta)`.
-    fn constants_have_the_exact_value<const D: usize>()
-    where
-        Dim<D>: Space<D>,
-    {
+    fn constants_have_the_exact_value<const D: usize>() {
         let schur = CellSchur::<D>::new().unwrap();
         let sum: f64 = schur.unit.iter().sum();
         assert!((sum - 0.5 * D as f64).abs() < 1e-10, "{sum}");
@@ -146,10 +136,7 @@ mod tests {
     }
 
     /// A uniform viscosity given as a matrix of the cell's own is one in the scale.
-    fn viscosities_add_up<const D: usize>()
-    where
-        Dim<D>: Space<D>,
-    {
+    fn viscosities_add_up<const D: usize>() {
         let mut schur = CellSchur::<D>::new().unwrap();
         let (eta, h) = (40.0, 0.25f64);
         let stiffness = h.powi(D as i32 - 2);
@@ -162,10 +149,7 @@ mod tests {
     }
 
     /// The factor turns a plain cell into its mass matrix.
-    fn a_plain_cell_has_its_mass<const D: usize>()
-    where
-        Dim<D>: Space<D>,
-    {
+    fn a_plain_cell_has_its_mass<const D: usize>() {
         let schur = CellSchur::<D>::new().unwrap().unit;
         let mass = &*ReferenceMatrices::<D>::new().pressure_mass;
         let m = ReferenceMatrices::<D>::PRESSURE;
@@ -188,10 +172,7 @@ mod tests {
         viscosities_add_up::<3>();
     }
     /// The weights around a penalised ball away from the walls, those near its surface first.
-    fn around_a_penalised_ball<const D: usize>(viscosity_ratio: f64) -> [Vec<f64>; 2]
-    where
-        Dim<D>: Space<D>,
-    {
+    fn around_a_penalised_ball<const D: usize>(viscosity_ratio: f64) -> [Vec<f64>; 2] {
         let formulation = Formulation::Paper(PaperParams { viscosity_ratio, ..PaperParams::default() });
         let mesh = TreeMesh::refine(Aabb::unit(), [1; D], [false; D], 4, |_, _, _| true).unwrap();
         let centre = Vector::<D>::repeat(0.47);
@@ -209,10 +190,7 @@ mod tests {
         around
     }
 
-    fn weights_near_a_surface<const D: usize>()
-    where
-        Dim<D>: Space<D>,
-    {
+    fn weights_near_a_surface<const D: usize>() {
         let [near, far] = around_a_penalised_ball::<D>(1.0001);
         assert!(near.iter().chain(&far).all(|w| (w - 1.0).abs() < 0.05));
         let [near, far] = around_a_penalised_ball::<D>(1e3);

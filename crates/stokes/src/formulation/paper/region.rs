@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use gluey_fem::NodeMap;
-use gluey_geom::{Dim, Space, Twist, Vector, Wrench};
+use gluey_geom::{Twist, Vector, Wrench};
 use gluey_levelset::{Ball, BallTree, Body, Ramp};
 
 use super::moments::BodyMoments;
@@ -33,10 +33,7 @@ pub struct SolidRegion<const D: usize> {
     pub(super) cells: Arc<Vec<SolidCell>>,
 }
 
-impl<const D: usize> SolidRegion<D>
-where
-    Dim<D>: Space<D>,
-{
+impl<const D: usize> SolidRegion<D> {
     /// Evaluates the solid fraction at the quadrature points of all cells near the bodies.
     pub fn new(
         discretisation: &Discretisation<D>,
@@ -189,10 +186,7 @@ fn each_body<const D: usize>(
     discretisation: &Discretisation<D>,
     bodies: &[Ball<D>],
     motion: impl Fn(usize) -> Option<Twist<D>>,
-) -> Result<Vec<Twist<D>>, StokesError>
-where
-    Dim<D>: Space<D>,
-{
+) -> Result<Vec<Twist<D>>, StokesError> {
     let cell_size = discretisation.finest_cell_size();
     let of_body = |body: usize| {
         let radius = bodies[body].bounding_radius();

@@ -9,7 +9,6 @@
 //! there are rough: so a sweep on the nodes of such a *film* and of the cells around it goes before the
 //! corrections ([`FilmSmoother`]).
 
-use gluey_geom::{Dim, Space};
 use gluey_linalg::{
     Chebyshev, ChebyshevParams, Guess, LinOp, Preconditioner, SchwarzPatches, SymmetricBlockMatrix, vector,
 };
@@ -30,10 +29,7 @@ pub struct PenalisedSmoother<const D: usize> {
     sweep: SolidSweep<CountedOperator<f32, D>, D>,
 }
 
-impl<const D: usize> PenalisedSmoother<D>
-where
-    Dim<D>: Space<D>,
-{
+impl<const D: usize> PenalisedSmoother<D> {
     /// The smoother on the nodes in `smoothed`, among them those of `solid`, which are all that the solid
     /// touches and on which the operator is `matrix`.
     pub fn new(
@@ -80,10 +76,7 @@ pub struct FilmSmoother<const D: usize> {
     x: Vec<f64>,
 }
 
-impl<const D: usize> FilmSmoother<D>
-where
-    Dim<D>: Space<D>,
-{
+impl<const D: usize> FilmSmoother<D> {
     /// The smoother on the nodes in `film`; those in `touched` the solid touches.
     pub fn new(elements: &Elements<'_, D>, film: &[bool], touched: &[bool]) -> Result<Self, StokesError> {
         let system = elements.system();
@@ -159,10 +152,7 @@ struct SolidSweep<A, const D: usize> {
     x: Vec<f32>,
 }
 
-impl<A: LinOp<f32>, const D: usize> SolidSweep<A, D>
-where
-    Dim<D>: Space<D>,
-{
+impl<A: LinOp<f32>, const D: usize> SolidSweep<A, D> {
     fn new(mut operator: A, mut preconditioner: DiagonalAndPatches<D>) -> Result<Self, StokesError> {
         let chebyshev = Chebyshev::for_operator(&mut operator, &mut preconditioner, &SWEEP)?;
         let dim = operator.dim();
@@ -187,10 +177,7 @@ struct DiagonalAndPatches<const D: usize> {
     z: Vec<f32>,
 }
 
-impl<const D: usize> DiagonalAndPatches<D>
-where
-    Dim<D>: Space<D>,
-{
+impl<const D: usize> DiagonalAndPatches<D> {
     fn new(
         mut diagonal: Vec<f32>,
         solid: &NumberedNodes<'_, D>,

@@ -9,7 +9,6 @@ use std::sync::Arc;
 
 use gluey_fem::cells::{CellData, CellOperator, Workspace};
 use gluey_fem::{Chunks, NodeMap};
-use gluey_geom::{Dim, Space};
 use gluey_linalg::BlockError;
 
 use super::pressures::pressure_matrices;
@@ -27,10 +26,7 @@ pub struct Penalty<const D: usize> {
     pub stress: SolidStress<D>,
 }
 
-impl<const D: usize> AddedViscosity<D> for Penalty<D>
-where
-    Dim<D>: Space<D>,
-{
+impl<const D: usize> AddedViscosity<D> for Penalty<D> {
     /// The ratio `r` of the viscosities of solid and fluid.
     fn contrast(&self) -> f64 {
         1.0 / (1.0 - self.factor)

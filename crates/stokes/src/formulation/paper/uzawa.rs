@@ -9,7 +9,6 @@
 //! to the saddle point of eq. 8. Each prediction starts cold and makes a fixed number of steps: the softness
 //! this leaves is part of the formulation. One step alone never uses the multiplier: a penalty method.
 
-use gluey_geom::{Dim, Space};
 use gluey_linalg::vector;
 
 use super::params::PaperParams;
@@ -26,10 +25,7 @@ pub fn solve<const D: usize>(
     data: &FlowData<'_>,
     x: &mut [f64],
     solve: &mut LinearSolve<'_>,
-) -> Result<Multiplier, StokesError>
-where
-    Dim<D>: Space<D>,
-{
+) -> Result<Multiplier, StokesError> {
     let (system, reference) = (&problem.system, vector::norm(data.b));
     let mut multiplier = vec![0.0; system.space.full_dim()];
     let mut stress = (params.uzawa_steps > 1).then(|| stress.operator(system.space.nodes()));
@@ -52,9 +48,7 @@ fn subtract_multiplier<const D: usize>(
     stress: &mut SolidOperator<D>,
     multiplier: &[f64],
     b: &mut [f64],
-) where
-    Dim<D>: Space<D>,
-{
+) {
     let mut load = vec![0.0; system.velocity_dim()];
     stress.apply(multiplier, &mut load);
     system.space.reduce(&mut load);

@@ -1,7 +1,7 @@
 //! Bodies cut flat.
 
 use gluey_fem::TreeMesh;
-use gluey_geom::{Aabb, Vector};
+use gluey_geom::{Aabb, Dim, Vector};
 use gluey_levelset::Body;
 use gluey_linalg::LinOp;
 
@@ -18,20 +18,14 @@ struct Case<const D: usize> {
 }
 
 /// What is found.
-struct Found<const D: usize>
-where
-    Dim<D>: Space<D>,
-{
+struct Found<const D: usize> {
     problem: Problem<D>,
     velocity: Vec<f64>,
     pressure: Vec<f64>,
     twist: Twist<D>,
 }
 
-impl<const D: usize> Case<D>
-where
-    Dim<D>: Space<D>,
-{
+impl<const D: usize> Case<D> {
     /// A body of this radius, with flats given by directions and distances in radii.
     fn new(level: u8, center: Vector<D>, radius: f64, flats: &[(Vector<D>, f64)]) -> Self {
         let flat = |&(normal, share): &(Vector<D>, f64)| Flat {
@@ -76,28 +70,19 @@ fn couette<const D: usize>(x: &Vector<D>) -> Vector<D> {
     Vector::from_fn(|d, _| if d == 0 { x[1] - 0.5 } else { 0.0 })
 }
 
-fn spin<const D: usize>(twist: &Twist<D>) -> f64
-where
-    Dim<D>: Space<D>,
-{
+fn spin<const D: usize>(twist: &Twist<D>) -> f64 {
     Dim::<D>::spin_slice(&twist.spin)[Dim::<D>::ROT - 1]
 }
 
 /// Largest component of a difference of motions.
-fn distance<const D: usize>(a: &Twist<D>, b: &Twist<D>) -> f64
-where
-    Dim<D>: Space<D>,
-{
+fn distance<const D: usize>(a: &Twist<D>, b: &Twist<D>) -> f64 {
     let difference = *a - *b;
     let spins = Dim::<D>::spin_slice(&difference.spin).iter().map(|s| s.abs());
     spins.fold(difference.velocity.amax(), f64::max)
 }
 
 /// Mesh levels, centres and flats in general position, two of which meet in the body.
-fn general<const D: usize>() -> Case<D>
-where
-    Dim<D>: Space<D>,
-{
+fn general<const D: usize>() -> Case<D> {
     let center = Vector::from_fn(|d, _| 0.5 + [0.017, -0.024, 0.031][d]);
     let arm = |x: [f64; 3]| Vector::<D>::from_fn(|d, _| x[d]);
     let flats = [(arm([0.9, 0.2, -0.3]), 0.7), (arm([0.5, 0.8, 0.2]), 0.75), (arm([-0.1, -1.0, 0.1]), 0.8)];
@@ -105,10 +90,7 @@ where
 }
 
 /// A body in a fluid that moves like a solid moves with it, whatever its shape.
-fn a_rigid_motion_is_found<const D: usize>()
-where
-    Dim<D>: Space<D>,
-{
+fn a_rigid_motion_is_found<const D: usize>() {
     let case = general::<D>();
     let mut motion =
         Twist::<D> { velocity: Vector::from_fn(|d, _| 0.3 - 0.2 * d as f64), ..Twist::default() };
@@ -135,10 +117,7 @@ fn truncated_bodies_move_with_a_fluid_that_moves_like_a_solid() {
 }
 
 /// Constant pressures push no body, since its surface is closed.
-fn constants_are_in_the_kernel<const D: usize>()
-where
-    Dim<D>: Space<D>,
-{
+fn constants_are_in_the_kernel<const D: usize>() {
     let problem = general::<D>().problem();
     let system = &problem.system;
     let mut x = vec![0.0f64; system.dim()];
@@ -158,10 +137,7 @@ fn constant_pressures_do_no_work_on_truncated_bodies() {
 }
 
 /// Mirror images of a body and a shear move as mirror images.
-fn symmetries_hold<const D: usize>()
-where
-    Dim<D>: Space<D>,
-{
+fn symmetries_hold<const D: usize>() {
     let case = general::<D>();
     let twist = case.solve(couette).twist;
     for mirrors in 1..1 << D {
@@ -195,10 +171,7 @@ fn truncated_bodies_keep_the_symmetries_of_a_shear() {
 }
 
 /// Planes beyond the ball change no bit.
-fn far_planes_change_nothing<const D: usize>()
-where
-    Dim<D>: Space<D>,
-{
+fn far_planes_change_nothing<const D: usize>() {
     let mut case = general::<D>();
     let discretisation = case.discretisation();
     let cut = |flats: &Flats<D>| CutCells::new(&discretisation, &[case.ball], flats);
@@ -252,10 +225,7 @@ fn penalty_around_slab<const D: usize>(
     [middle, normal]: [Vector<D>; 2],
     radius: f64,
     width: f64,
-) -> Result<f64, StokesError>
-where
-    Dim<D>: Space<D>,
-{
+) -> Result<f64, StokesError> {
     let mesh = TreeMesh::uniform(Aabb::unit(), [1; D], [false; D], level).unwrap();
     let bodies = [-1.0, 1.0].map(|side| Ball::new(middle + normal * (side * radius), radius));
     let distance = radius - 0.5 * width * mesh.size(level);
@@ -273,10 +243,7 @@ where
 
 /// All cells in the slab between flats that face each other have roots and moderate eigenvalues, whatever its
 /// direction: 95 is the largest.
-fn slabs_are_resolved<const D: usize>(level: u8, radius: f64, count: usize)
-where
-    Dim<D>: Space<D>,
-{
+fn slabs_are_resolved<const D: usize>(level: u8, radius: f64, count: usize) {
     for k in 0..count {
         let (x, cell) = (k as f64, 0.5f64.powi(level.into()));
         let normal = Vector::<D>::from_fn(|d, _| [(0.7 * x).cos(), (0.7 * x).sin(), 0.8 - 0.3 * x][d]);
@@ -297,10 +264,7 @@ fn slabs_between_bodies_are_resolved() {
 
 /// Where penalties are far too small, the error names the first root whose block is not positive, and a body
 /// at its surface.
-fn blocks_that_are_not_positive_are_named<const D: usize>(level: u8)
-where
-    Dim<D>: Space<D>,
-{
+fn blocks_that_are_not_positive_are_named<const D: usize>(level: u8) {
     let mesh = TreeMesh::uniform(Aabb::unit(), [1; D], [false; D], level).unwrap();
     let discretisation = Discretisation::new(mesh);
     let bodies = [0.27, 0.71].map(|x| Ball::new(Vector::<D>::repeat(x), 0.19));

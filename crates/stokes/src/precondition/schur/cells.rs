@@ -1,7 +1,6 @@
 //! The matrices on the pressures of single cells that make up the approximate Schur complement.
 
 use gluey_fem::ReferenceMatrices;
-use gluey_geom::{Dim, Space};
 use gluey_linalg::BlockError;
 
 use crate::operator::Elements;
@@ -22,10 +21,7 @@ impl PressureMatrices {
     ///
     /// # Errors
     /// Those of [`crate::operator::AddedViscosity::pressure_matrices`].
-    pub fn new<const D: usize>(elements: &Elements<'_, D>, viscosity: f64) -> Result<Self, BlockError>
-    where
-        Dim<D>: Space<D>,
-    {
+    pub fn new<const D: usize>(elements: &Elements<'_, D>, viscosity: f64) -> Result<Self, BlockError> {
         let cells = elements.cells().iter().enumerate();
         let scale = |(index, cell): (usize, &ActiveCell)| {
             cell.volume * cell.viscous / (viscosity * elements.viscous(index).0)

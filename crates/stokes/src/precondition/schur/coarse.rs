@@ -13,7 +13,6 @@
 use std::sync::Arc;
 
 use gluey_fem::Interpolation;
-use gluey_geom::{Dim, Space};
 use gluey_linalg::{DirectError, LinOp, Ordering, Preconditioner, Subset, vector};
 use gluey_parallel::Halo;
 use nalgebra::{DMatrix, DVector};
@@ -33,10 +32,7 @@ const LEAST_COLUMNS: usize = 16;
 const SHARE_OF_MASS: f64 = 1e-3;
 
 /// `P (S_0^-1 - T_0^-1) P^T`.
-pub struct CoarseSchur<const D: usize>
-where
-    Dim<D>: Space<D>,
-{
+pub struct CoarseSchur<const D: usize> {
     /// The meshes, coarsest first, and of those of all ranks the first.
     meshes: Vec<Discretisation<D>>,
     first_shared: usize,
@@ -50,10 +46,7 @@ where
 }
 
 /// The correction on the coarsest mesh.
-struct CoarsestSchur<const D: usize>
-where
-    Dim<D>: Space<D>,
-{
+struct CoarsestSchur<const D: usize> {
     viscosity: f64,
     system: StokesSystem<D>,
     /// `S_0^-1 - T_0^-1` for the unknown pressures in `unknowns`.
@@ -64,10 +57,7 @@ where
     corrected: DVector<f32>,
 }
 
-impl<const D: usize> CoarseSchur<D>
-where
-    Dim<D>: Space<D>,
-{
+impl<const D: usize> CoarseSchur<D> {
     /// The correction from the coarsest of `meshes` (coarsest first), or, where that is too fine, from its
     /// coarsening; `None` where even the cells from which the mesh was refined are too many. What stayed the
     /// same is taken from `before`. All ranks call this, with the halo of the pressures.
@@ -135,10 +125,7 @@ where
     }
 }
 
-impl<const D: usize> CoarsestSchur<D>
-where
-    Dim<D>: Space<D>,
-{
+impl<const D: usize> CoarsestSchur<D> {
     fn new(coarsest: &Discretisation<D>, viscosity: f64) -> Result<Self, StokesError> {
         let system = without_bodies(coarsest, viscosity);
         let unknowns = Subset::new(system.pressure.dim(), |q| system.pressure.is_free(q));
@@ -161,10 +148,7 @@ where
 fn with_small_coarsest<const D: usize>(
     meshes: &[Discretisation<D>],
     before: Option<&CoarseSchur<D>>,
-) -> Option<Vec<Discretisation<D>>>
-where
-    Dim<D>: Space<D>,
-{
+) -> Option<Vec<Discretisation<D>>> {
     let mut all = meshes.to_vec();
     while all[0].pressure.node_count() > MOST_PRESSURES {
         let level = all[0].mesh.max_level().checked_sub(1)?;
@@ -182,10 +166,7 @@ fn correction<const D: usize>(
     system: &StokesSystem<D>,
     viscosity: f64,
     unknowns: &[u32],
-) -> Result<DMatrix<f32>, StokesError>
-where
-    Dim<D>: Space<D>,
-{
+) -> Result<DMatrix<f32>, StokesError> {
     let discretisation = system.discretisation();
     let failed = |matrix| StokesError::BoxPressures {
         matrix,
@@ -208,10 +189,7 @@ where
 fn dense_schur<const D: usize>(
     system: &StokesSystem<D>,
     unknowns: &[u32],
-) -> Result<DMatrix<f64>, StokesError>
-where
-    Dim<D>: Space<D>,
-{
+) -> Result<DMatrix<f64>, StokesError> {
     let assembled = assemble_viscous(system)?;
     let factor = factorised(&assembled.matrix, Ordering::Amd)?;
     let velocities = system.velocity_dim();

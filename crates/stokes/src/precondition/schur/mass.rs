@@ -4,7 +4,6 @@
 use std::sync::Arc;
 
 use gluey_fem::ReferenceMatrices;
-use gluey_geom::{Dim, Space};
 use gluey_linalg::{Jagged, Pattern, SparseMatrix};
 use rayon::prelude::*;
 
@@ -20,10 +19,7 @@ use crate::surface::SurfaceCoupling;
 pub fn pressure_matrix<const D: usize>(
     elements: &Elements<'_, D>,
     viscosity: f64,
-) -> Result<SparseMatrix, StokesError>
-where
-    Dim<D>: Space<D>,
-{
+) -> Result<SparseMatrix, StokesError> {
     let matrices = PressureMatrices::new(elements, viscosity);
     let mass = matrices
         .map_err(StokesError::from)
@@ -38,10 +34,7 @@ where
 pub fn pressure_mass<const D: usize>(
     system: &StokesSystem<D>,
     matrices: &PressureMatrices,
-) -> Result<SparseMatrix, StokesError>
-where
-    Dim<D>: Space<D>,
-{
+) -> Result<SparseMatrix, StokesError> {
     let (nodes, expansion) = (&system.discretisation().pressure, pressure_expansion(&system.pressure));
     let sources = Sources::new(system, matrices);
     let unknowns = |at: usize| {
@@ -91,10 +84,7 @@ fn weight_of(unknown: usize, terms: &[(u32, f64)]) -> f64 {
 }
 
 /// The cells whose matrices are added up: those of the fluid, then those that surfaces cut.
-struct Sources<'a, const D: usize>
-where
-    Dim<D>: Space<D>,
-{
+struct Sources<'a, const D: usize> {
     system: &'a StokesSystem<D>,
     matrices: &'a PressureMatrices,
     /// Own cells among those of the system.
@@ -103,10 +93,7 @@ where
     of_cut: Vec<(usize, Vec<f64>)>,
 }
 
-impl<'a, const D: usize> Sources<'a, D>
-where
-    Dim<D>: Space<D>,
-{
+impl<'a, const D: usize> Sources<'a, D> {
     fn new(system: &'a StokesSystem<D>, matrices: &'a PressureMatrices) -> Self {
         let m = ReferenceMatrices::<D>::PRESSURE;
         let is_own = |cell: u32| system.discretisation().is_own(cell as usize);

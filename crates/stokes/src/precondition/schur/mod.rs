@@ -13,7 +13,6 @@ mod coarse;
 mod mass;
 mod weights;
 
-use gluey_geom::{Dim, Space};
 use gluey_linalg::{Chebyshev, Guess, Jacobi, LinOp, SellMatrix, SpectralInterval, estimate_lambda_max_from};
 use gluey_parallel::Halo;
 
@@ -37,10 +36,7 @@ const LANCZOS_STEPS: usize = 15;
 const SAFETY: f64 = 1.1;
 
 /// `T^-1`, up to Chebyshev's error, with the correction for the box.
-pub struct SchurInverse<const D: usize>
-where
-    Dim<D>: Space<D>,
-{
+pub struct SchurInverse<const D: usize> {
     /// `T`.
     mass: SellMatrix<f32>,
     jacobi: Jacobi<f32>,
@@ -50,10 +46,7 @@ where
     halo: Halo,
 }
 
-impl<const D: usize> SchurInverse<D>
-where
-    Dim<D>: Space<D>,
-{
+impl<const D: usize> SchurInverse<D> {
     /// For the pressures of the system on the finest of `meshes` (coarsest first). What stayed the same is
     /// taken from `before`. All ranks call this.
     ///
@@ -122,10 +115,7 @@ mod tests {
     use gluey_geom::Aabb;
 
     /// A box without bodies, its coarser meshes and its system.
-    fn empty_box<const D: usize>(level: u8) -> (Vec<Discretisation<D>>, StokesSystem<D>)
-    where
-        Dim<D>: Space<D>,
-    {
+    fn empty_box<const D: usize>(level: u8) -> (Vec<Discretisation<D>>, StokesSystem<D>) {
         let mesh = TreeMesh::<D>::refine(Aabb::unit(), [1; D], [false; D], level, |lower, _, level| {
             level < 3 || lower[0] < 0.5
         })
@@ -138,10 +128,7 @@ mod tests {
     }
 
     /// Relative errors of `S^-1 r` with and without the correction from the coarsest mesh.
-    fn errors<const D: usize>(level: u8, load: impl Fn(f64) -> f64) -> [f64; 2]
-    where
-        Dim<D>: Space<D>,
-    {
+    fn errors<const D: usize>(level: u8, load: impl Fn(f64) -> f64) -> [f64; 2] {
         let (meshes, system) = empty_box::<D>(level);
         let fine = &meshes[meshes.len() - 1];
         let product = |q: usize| fine.pressure.point(q).iter().map(|&x| load(x)).product();

@@ -17,7 +17,7 @@
 //! weight is the geometric mean of the two, the root of the ratio.
 
 use gluey_fem::{ReferenceMatrices, TreeMesh};
-use gluey_geom::{Aabb, Dim, Space, Vector};
+use gluey_geom::{Aabb, Vector};
 use gluey_levelset::Ball;
 use gluey_linalg::SparseMatrix;
 use rayon::prelude::*;
@@ -38,9 +38,7 @@ pub fn scale_by_weights<const D: usize>(
     mass: &mut SparseMatrix,
     elements: &Elements<'_, D>,
     matrices: &PressureMatrices,
-) where
-    Dim<D>: Space<D>,
-{
+) {
     let mut weights = weights(elements, matrices);
     elements.system().pressure.halo().clone().update(&mut weights);
     let roots: Vec<f64> = weights.into_iter().map(f64::sqrt).collect();
@@ -53,10 +51,7 @@ pub fn scale_by_weights<const D: usize>(
 
 /// The weights of all owned pressures, one for those that are not unknowns. A part lacks what cells far from
 /// its own add to pressures at hanging nodes and near surfaces: there weights are a little smaller.
-pub fn weights<const D: usize>(elements: &Elements<'_, D>, matrices: &PressureMatrices) -> Vec<f64>
-where
-    Dim<D>: Space<D>,
-{
+pub fn weights<const D: usize>(elements: &Elements<'_, D>, matrices: &PressureMatrices) -> Vec<f64> {
     let system = elements.system();
     let discretisation = system.discretisation();
     let fixed = fixed_nodes(&system.space);
@@ -81,10 +76,7 @@ where
 }
 
 /// `s_q / m_q` in the middle of a mesh without bodies: what weights are relative to.
-fn ratio_inside<const D: usize>() -> f64
-where
-    Dim<D>: Space<D>,
-{
+fn ratio_inside<const D: usize>() -> f64 {
     let mesh = TreeMesh::uniform(Aabb::unit(), [1; D], [false; D], 2).expect("four cells a side");
     let discretisation = Discretisation::new(mesh);
     let system = without_bodies(&discretisation, 1.0);
@@ -98,10 +90,7 @@ where
 }
 
 /// The system on a mesh without the bodies.
-pub fn without_bodies<const D: usize>(discretisation: &Discretisation<D>, viscosity: f64) -> StokesSystem<D>
-where
-    Dim<D>: Space<D>,
-{
+pub fn without_bodies<const D: usize>(discretisation: &Discretisation<D>, viscosity: f64) -> StokesSystem<D> {
     let bodies: [Ball<D>; 0] = [];
     let solid = vec![None; discretisation.velocity.node_count()];
     let space = VelocitySpace::new(discretisation, &bodies, &solid);
@@ -109,10 +98,7 @@ where
 }
 
 /// The nodes whose velocity is that of the boundary or of a body.
-fn fixed_nodes<const D: usize>(space: &VelocitySpace<D>) -> Vec<bool>
-where
-    Dim<D>: Space<D>,
-{
+fn fixed_nodes<const D: usize>(space: &VelocitySpace<D>) -> Vec<bool> {
     let is_fixed = |n: usize| space.body_of(n).is_some() || space.nodes().is_on_boundary(n);
     (0..space.nodes().node_count()).into_par_iter().map(is_fixed).collect()
 }
@@ -121,10 +107,7 @@ where
 fn pressures_of<const D: usize>(
     system: &StokesSystem<D>,
     is_meant: impl Fn(usize) -> bool + Sync,
-) -> Vec<bool>
-where
-    Dim<D>: Space<D>,
-{
+) -> Vec<bool> {
     let discretisation = system.discretisation();
     let mut meant = vec![false; system.pressure.dim()];
     let cells: Vec<usize> =
@@ -146,10 +129,7 @@ fn ratios<const D: usize>(
     matrices: &PressureMatrices,
     fixed: &[bool],
     special: &[bool],
-) -> Vec<(usize, f64)>
-where
-    Dim<D>: Space<D>,
-{
+) -> Vec<(usize, f64)> {
     let system = elements.system();
     let discretisation = system.discretisation();
     let n = ReferenceMatrices::<D>::VELOCITY;
@@ -179,10 +159,7 @@ where
 type Corner = (usize, usize, f64);
 
 /// The corners of active cells on which each special pressure acts.
-fn corners_of<const D: usize>(system: &StokesSystem<D>, special: &[bool]) -> Vec<Vec<Corner>>
-where
-    Dim<D>: Space<D>,
-{
+fn corners_of<const D: usize>(system: &StokesSystem<D>, special: &[bool]) -> Vec<Vec<Corner>> {
     let discretisation = system.discretisation();
     let pressure = pressure_expansion(&system.pressure);
     let corners = |index: usize| discretisation.pressure.cell(system.cells[index].cell as usize);
@@ -199,10 +176,7 @@ where
 }
 
 /// The diagonal of `A` at the nodes of these cells; elsewhere it may lack terms.
-fn diagonal_near<const D: usize>(elements: &Elements<'_, D>, corners: &[Vec<Corner>]) -> Vec<f64>
-where
-    Dim<D>: Space<D>,
-{
+fn diagonal_near<const D: usize>(elements: &Elements<'_, D>, corners: &[Vec<Corner>]) -> Vec<f64> {
     let discretisation = elements.system().discretisation();
     let nodes_of = |index: usize| discretisation.velocity.cell(elements.cells()[index].cell as usize);
     let mut is_near = vec![false; discretisation.velocity.node_count()];
@@ -252,20 +226,14 @@ mod tests {
     use crate::space::solid_nodes;
 
     /// The weights of a system whose fluid has this viscosity.
-    fn weights_in<const D: usize>(system: &StokesSystem<D>, viscosity: f64) -> Vec<f64>
-    where
-        Dim<D>: Space<D>,
-    {
+    fn weights_in<const D: usize>(system: &StokesSystem<D>, viscosity: f64) -> Vec<f64> {
         let elements = Elements::new(system, ReferenceMatrices::<D>::VELOCITY);
         let matrices = PressureMatrices::new(&elements, viscosity).unwrap();
         weights(&elements, &matrices)
     }
 
     /// Weights by the number of walls a node lies on.
-    fn weights_of_a_box<const D: usize>() -> Vec<Vec<f64>>
-    where
-        Dim<D>: Space<D>,
-    {
+    fn weights_of_a_box<const D: usize>() -> Vec<Vec<f64>> {
         let mesh = TreeMesh::uniform(Aabb::unit(), [1; D], [false; D], 3).unwrap();
         let discretisation = Discretisation::new(mesh);
         let system = without_bodies(&discretisation, 2.5);
@@ -298,10 +266,7 @@ mod tests {
     }
 
     /// Without walls in two directions, and with a ball and hanging nodes.
-    fn weights_are_less_near_bodies_only<const D: usize>()
-    where
-        Dim<D>: Space<D>,
-    {
+    fn weights_are_less_near_bodies_only<const D: usize>() {
         let ball = Ball::new(Vector::<D>::repeat(0.5), 0.15);
         let mesh = TreeMesh::<D>::refine(Aabb::unit(), [1; D], [true; D], 4, |lower, h, level| {
             let centre: Vector<D> = lower.add_scalar(0.5 * h);

@@ -6,7 +6,6 @@
 //!
 //! `z = G r`, `z += V (r - A z)`, `z += G (r - A z)`, `z += C (r - A z)`.
 
-use gluey_geom::{Dim, Space};
 use gluey_linalg::vector;
 use gluey_parallel::Halo;
 
@@ -19,10 +18,7 @@ use crate::surface::SurfaceCoupling;
 
 /// The smoothers of the finest mesh around the rigid levels. Vectors hold the same at ghosts as at their
 /// owners.
-pub struct SurfaceCorrection<const D: usize>
-where
-    Dim<D>: Space<D>,
-{
+pub struct SurfaceCorrection<const D: usize> {
     smoother: SurfaceSmoother<D>,
     /// The velocities of the finest rigid level.
     rigid: VelocitySpace<D>,
@@ -40,10 +36,7 @@ where
     correction: Vec<f32>,
 }
 
-impl<const D: usize> SurfaceCorrection<D>
-where
-    Dim<D>: Space<D>,
-{
+impl<const D: usize> SurfaceCorrection<D> {
     /// For the system of `elements`, on levels of which the finest has the velocities `rigid`. All ranks call
     /// this.
     pub fn new(
@@ -93,10 +86,7 @@ where
     }
 }
 
-impl<const D: usize> Correction for SurfaceCorrection<D>
-where
-    Dim<D>: Space<D>,
-{
+impl<const D: usize> Correction for SurfaceCorrection<D> {
     fn apply(&mut self, r: &[f64], z: &mut [f64], levels: &mut dyn FnMut(&mut [f64], &mut [f32])) {
         let norm = norm(self.smoother.halo(), r);
         if norm == 0.0 {

@@ -1,7 +1,6 @@
 //! The weak modes of all roots and the diagonal of the operator near surfaces, from one batch of roots after
 //! another: the matrix on all nodes near surfaces would take more memory than everything else.
 
-use gluey_geom::{Dim, Space};
 use gluey_linalg::{
     BlockGroups, Jagged, LocalTerm, ModesWorkspace, PatchError, Pattern, SymmetricBlockMatrix, WeakModes,
     weak_modes,
@@ -28,10 +27,7 @@ struct Batch {
 }
 
 /// Contributions of cells and pieces to the rows of numbered nodes.
-struct Contributions<'a, const D: usize>
-where
-    Dim<D>: Space<D>,
-{
+struct Contributions<'a, const D: usize> {
     elements: &'a Elements<'a, D>,
     forms: NodeForms<'a, D>,
     sources: Vec<MatrixSource>,
@@ -52,10 +48,7 @@ pub fn modes_and_diagonal<const D: usize>(
     nodes: &NumberedNodes<'_, D>,
     elements: &Elements<'_, D>,
     patches: Jagged<u32>,
-) -> Result<(WeakModes<D>, Vec<f64>), ModesError>
-where
-    Dim<D>: Space<D>,
-{
+) -> Result<(WeakModes<D>, Vec<f64>), ModesError> {
     let contributions = Contributions::new(nodes, elements);
     let batches = batches(&patches, nodes.nodes.len());
     let workspace = || vec![u32::MAX; nodes.nodes.len()];
@@ -91,10 +84,7 @@ fn batches(patches: &Jagged<u32>, node_count: usize) -> Vec<Batch> {
     (0..patches.len()).step_by(ROOTS).map(batch).chain(without_roots).collect()
 }
 
-impl<'a, const D: usize> Contributions<'a, D>
-where
-    Dim<D>: Space<D>,
-{
+impl<'a, const D: usize> Contributions<'a, D> {
     fn new(nodes: &'a NumberedNodes<'a, D>, elements: &'a Elements<'a, D>) -> Self {
         let forms = NodeForms::new(nodes, elements.system().space.ghosts());
         let (mut terms, mut sources, mut pairs) = (Vec::new(), Vec::new(), Vec::new());

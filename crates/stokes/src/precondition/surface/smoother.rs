@@ -7,7 +7,7 @@
 //! that its diagonal does not tell apart are kept. Elsewhere Chebyshev's method with the diagonal is enough.
 
 use gluey_fem::ReferenceMatrices;
-use gluey_geom::{Dim, Space};
+use gluey_geom::Dim;
 use gluey_linalg::{
     Chebyshev, Guess, LinOp, PatchError, Preconditioner, SchwarzPatches, SpectralInterval, WeakModes,
     estimate_lambda_max_from, invert_spd, vector,
@@ -68,10 +68,7 @@ enum Inverses<const D: usize> {
     WeakModes(WeakModes<D>),
 }
 
-impl<const D: usize> SurfaceSmoother<D>
-where
-    Dim<D>: Space<D>,
-{
+impl<const D: usize> SurfaceSmoother<D> {
     /// The smoothers of a system with cut cells. Vectors that they are applied to hold the same at ghosts as
     /// at their owners. All ranks call this.
     ///
@@ -118,10 +115,7 @@ struct AssembledSmoother<const D: usize> {
     near: Vec<bool>,
 }
 
-impl<const D: usize> AssembledSmoother<D>
-where
-    Dim<D>: Space<D>,
-{
+impl<const D: usize> AssembledSmoother<D> {
     /// The smoother. All ranks call this.
     ///
     /// # Errors
@@ -157,10 +151,7 @@ where
     }
 }
 
-impl<const D: usize> SurfaceSmoother<D>
-where
-    Dim<D>: Space<D>,
-{
+impl<const D: usize> SurfaceSmoother<D> {
     /// `x += G r`, `r -= A G r` by the blocks `G`.
     pub fn add_blocks(&mut self, r: &mut [f32], x: &mut [f32]) {
         self.velocity.fill(0.0);
@@ -212,10 +203,7 @@ fn interval<const D: usize>(
     near: &[u32],
     reference: &ReferenceMatrices<D>,
     halo: &mut Halo,
-) -> Result<SpectralInterval, StokesError>
-where
-    Dim<D>: Space<D>,
-{
+) -> Result<SpectralInterval, StokesError> {
     let in_fluid = cell_lambda_max(reference);
     let mut on_owned = OnOwned::new(operator, halo);
     let largest = SAFETY * estimate_lambda_max_from(start, &mut on_owned, diagonal, LANCZOS_STEPS)?;
@@ -236,10 +224,7 @@ fn nodes_of_own_cells<const D: usize>(discretisation: &Discretisation<D>) -> Opt
 }
 
 /// The nodes of cut cells and of roots.
-fn near_surfaces<const D: usize>(elements: &Elements<'_, D>, surfaces: &SurfaceCoupling<D>) -> Vec<bool>
-where
-    Dim<D>: Space<D>,
-{
+fn near_surfaces<const D: usize>(elements: &Elements<'_, D>, surfaces: &SurfaceCoupling<D>) -> Vec<bool> {
     let nodes = &elements.system().discretisation().velocity;
     let mut near = vec![false; nodes.node_count()];
     let cut = surfaces.cut.cells.iter().map(|cell| cell.cell);
@@ -249,10 +234,7 @@ where
     near
 }
 
-impl<const D: usize> RootBlocks<D>
-where
-    Dim<D>: Space<D>,
-{
+impl<const D: usize> RootBlocks<D> {
     /// `z += G r`.
     fn add(&mut self, r: &[f32], z: &mut [f32]) {
         let Self { inverses, positions, shares, r: local, z: correction } = self;
@@ -320,10 +302,7 @@ fn shares<const D: usize>(
 }
 
 /// The error of the block of a root.
-fn at_root<const D: usize>(surfaces: &SurfaceCoupling<D>, error: PatchError) -> StokesError
-where
-    Dim<D>: Space<D>,
-{
+fn at_root<const D: usize>(surfaces: &SurfaceCoupling<D>, error: PatchError) -> StokesError {
     let PatchError { patch, source } = error;
     let (discretisation, roots) = (surfaces.discretisation(), surfaces.roots());
     let mut own = (0..roots.len()).filter(|&place| discretisation.is_own(roots[place] as usize));
@@ -340,10 +319,7 @@ fn nodal<const D: usize>(
     smoothed: &[bool],
     positions: &[u32],
     near_surfaces: &[f64],
-) -> Result<Vec<f32>, StokesError>
-where
-    Dim<D>: Space<D>,
-{
+) -> Result<Vec<f32>, StokesError> {
     let system = elements.system();
     let mut smoothed_in_fluid = smoothed.to_vec();
     positions.iter().for_each(|&k| smoothed_in_fluid[k as usize / D] = false);
@@ -364,10 +340,7 @@ fn diagonal<const D: usize>(
     elements: &Elements<'_, D>,
     mut nodal: Vec<f32>,
     [halo, of_blocks]: [&mut Halo; 2],
-) -> (BlockDiagonal, Option<StokesError>)
-where
-    Dim<D>: Space<D>,
-{
+) -> (BlockDiagonal, Option<StokesError>) {
     let system = elements.system();
     let rigid = Dim::<D>::RIGID;
     let mut blocks = system.twist_blocks();

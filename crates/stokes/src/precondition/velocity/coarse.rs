@@ -1,6 +1,5 @@
 //! The coarsest level of the velocity multigrid.
 
-use gluey_geom::{Dim, Space};
 use gluey_linalg::{DirectSpd, Ordering, Preconditioner, Subset};
 
 use crate::error::StokesError;
@@ -17,10 +16,7 @@ pub struct CoarseSolver {
 
 impl CoarseSolver {
     /// The factorised viscous matrix of the velocities of `space`.
-    pub fn new<const D: usize>(space: VelocitySpace<D>, viscosity: f64) -> Result<Self, StokesError>
-    where
-        Dim<D>: Space<D>,
-    {
+    pub fn new<const D: usize>(space: VelocitySpace<D>, viscosity: f64) -> Result<Self, StokesError> {
         let system = StokesSystem::new(space, viscosity);
         let assembled = assemble_viscous(&system)?;
         let factor = factorised(&assembled.matrix, Ordering::Amd)?;

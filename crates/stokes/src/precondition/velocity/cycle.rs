@@ -1,6 +1,5 @@
 //! One V-cycle on the velocity block.
 
-use gluey_geom::{Dim, Space};
 use gluey_linalg::{Preconditioner, Scalar, vector};
 use gluey_parallel::Halo;
 
@@ -20,10 +19,7 @@ pub struct LevelPlan<const D: usize> {
 }
 
 /// A V-cycle on the velocity block.
-pub struct VCycle<const D: usize>
-where
-    Dim<D>: Space<D>,
-{
+pub struct VCycle<const D: usize> {
     /// The meshes.
     pub hierarchy: Hierarchy<D>,
     /// Coarsest first.
@@ -36,10 +32,7 @@ where
     wide: [Vec<f64>; 2],
 }
 
-impl<const D: usize> VCycle<D>
-where
-    Dim<D>: Space<D>,
-{
+impl<const D: usize> VCycle<D> {
     /// The cycle on the meshes of `hierarchy`, a plan for each, in a fluid of this viscosity. All ranks call
     /// this.
     ///
@@ -92,10 +85,7 @@ where
     }
 }
 
-impl<const D: usize> VCycle<D>
-where
-    Dim<D>: Space<D>,
-{
+impl<const D: usize> VCycle<D> {
     /// `z = V r` on the reduced vectors of the finest rigid level.
     fn rigid_cycle<T: Scalar>(&mut self, r: &[f64], z: &mut [T]) {
         let norm = norm(&self.levels[self.levels.len() - 1].halo, r);
@@ -150,10 +140,7 @@ where
     }
 }
 
-impl<const D: usize> Preconditioner<f64> for VCycle<D>
-where
-    Dim<D>: Space<D>,
-{
+impl<const D: usize> Preconditioner<f64> for VCycle<D> {
     fn apply(&mut self, r: &[f64], z: &mut [f64]) {
         let Some(mut correction) = self.correction.take() else { return self.rigid_cycle(r, z) };
         correction.apply(r, z, &mut |f, u| self.rigid_velocities(f, u));

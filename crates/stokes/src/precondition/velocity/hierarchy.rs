@@ -3,7 +3,6 @@
 use std::sync::Arc;
 
 use gluey_fem::Interpolation;
-use gluey_geom::{Dim, Space};
 
 use crate::space::Discretisation;
 
@@ -24,10 +23,7 @@ impl<const D: usize> Default for Hierarchy<D> {
     }
 }
 
-impl<const D: usize> Hierarchy<D>
-where
-    Dim<D>: Space<D>,
-{
+impl<const D: usize> Hierarchy<D> {
     /// The parts of a rank of these meshes, coarsest first.
     pub fn of_parts(meshes: Vec<Discretisation<D>>) -> Self {
         let transfers = meshes.windows(2).map(|pair| pair[0].interpolation(&pair[1], |mesh| &mesh.velocity));

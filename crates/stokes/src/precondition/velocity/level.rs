@@ -1,7 +1,6 @@
 //! One level of the velocity multigrid: operator, smoother and transfer to the next coarser level, in `f32`.
 
 use gluey_fem::{Interpolation, ReferenceMatrices};
-use gluey_geom::{Dim, Space};
 use gluey_linalg::{Chebyshev, ChebyshevParams, Guess, LinOp, vector};
 use gluey_parallel::Halo;
 
@@ -34,10 +33,7 @@ pub const LEVEL_SWEEP: ChebyshevParams =
 
 /// A level of the multigrid.
 #[derive(Clone, Debug)]
-pub struct Level<const D: usize>
-where
-    Dim<D>: Space<D>,
-{
+pub struct Level<const D: usize> {
     /// Reduced velocities.
     pub space: VelocitySpace<D>,
     /// Of these: vectors hold the same at ghosts as at their owners.
@@ -67,10 +63,7 @@ pub struct Relaxation<const D: usize> {
     before: bool,
 }
 
-impl<const D: usize> Relaxation<D>
-where
-    Dim<D>: Space<D>,
-{
+impl<const D: usize> Relaxation<D> {
     /// Smooths around the finest cells. All ranks call this.
     fn new(space: &VelocitySpace<D>, viscosity: f64, smoothing: Smoothing) -> Result<Self, DiagonalError> {
         let discretisation = space.discretisation();
@@ -108,10 +101,7 @@ where
     }
 }
 
-impl<const D: usize> Level<D>
-where
-    Dim<D>: Space<D>,
-{
+impl<const D: usize> Level<D> {
     /// A level with rigid bodies, which smooths around its finest cells only, if at all.
     ///
     /// # Errors
@@ -188,9 +178,7 @@ fn restrict_load<const D: usize>(
     b: &mut [f32],
     twist_loads: &mut [f32],
     restrict: impl FnOnce(&[f32]),
-) where
-    Dim<D>: Space<D>,
-{
+) {
     let nodal = space.full_dim();
     twist_loads.copy_from_slice(&b[nodal..]);
     // Smoothers ignore the entries that this leaves at rigid nodes.
@@ -220,10 +208,7 @@ mod tests {
     use gluey_linalg::estimate_lambda_max;
 
     /// With hanging nodes, bodies and cells that two bodies share.
-    fn eigenvalues_stay_below_the_interval<const D: usize>(gap: f64)
-    where
-        Dim<D>: Space<D>,
-    {
+    fn eigenvalues_stay_below_the_interval<const D: usize>(gap: f64) {
         let centres = [-1.0, 1.0].map(|side| {
             let mut centre = Vector::<D>::repeat(0.47);
             centre[0] += side * (0.2 + 0.5 * gap);
@@ -245,10 +230,7 @@ mod tests {
         assert!(largest < upper && upper < 1.2 * largest, "{largest} {upper}");
     }
 
-    fn level_around_a_ball<const D: usize>() -> Level<D>
-    where
-        Dim<D>: Space<D>,
-    {
+    fn level_around_a_ball<const D: usize>() -> Level<D> {
         let ball = Ball::new(Vector::<D>::repeat(0.47), 0.1);
         let mesh = TreeMesh::<D>::refine(Aabb::unit(), [1; D], [false; D], 4, |_, _, _| true).unwrap();
         let discretisation = Discretisation::new(mesh);

@@ -10,7 +10,6 @@
 //! After the sweep of the level the error `e` on the nodes within [`RELAXED_RINGS`] cells of a body and on
 //! the twists is smoothed by Chebyshev's method for `E^T A E e = E^T (b - A x)`, all else at rest.
 
-use gluey_geom::{Dim, Space};
 use gluey_linalg::{Chebyshev, ChebyshevParams, Guess, LinOp};
 
 use super::SAFETY;
@@ -37,10 +36,7 @@ pub struct NearBodies<const D: usize> {
     e: Vec<f32>,
 }
 
-impl<const D: usize> NearBodies<D>
-where
-    Dim<D>: Space<D>,
-{
+impl<const D: usize> NearBodies<D> {
     /// For a level that acts with `cells` and smooths by `diagonal`, with eigenvalues up to `lambda_max`;
     /// `None` in 3D and without bodies. All ranks call this.
     pub fn new(

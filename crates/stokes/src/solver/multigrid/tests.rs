@@ -1,7 +1,7 @@
 //! Properties of the levels that the Krylov method relies on.
 
 use gluey_fem::TreeMesh;
-use gluey_geom::{Aabb, Dim, Space, Vector};
+use gluey_geom::{Aabb, Vector};
 use gluey_levelset::Ball;
 use gluey_linalg::{LinOp, vector};
 
@@ -12,10 +12,7 @@ use super::MultigridSolver;
 use crate::solver::SaddleSolver;
 
 /// Two balls on a mesh with hanging nodes.
-fn problem<const D: usize>(formulation: Formulation) -> Problem<D>
-where
-    Dim<D>: Space<D>,
-{
+fn problem<const D: usize>(formulation: Formulation) -> Problem<D> {
     let balls = [0.3, 0.65].map(|x| Ball::new(Vector::<D>::repeat(x), 0.15));
     let mesh = TreeMesh::refine(Aabb::unit(), [1; D], [false; D], 4, |lower, _, level| {
         level < 3 || lower.iter().all(|&x| x < 0.8)
@@ -24,10 +21,7 @@ where
     Problem::new(mesh, &balls, 1.0, formulation).unwrap()
 }
 
-fn level_operators_are_symmetric<const D: usize>(formulation: Formulation)
-where
-    Dim<D>: Space<D>,
-{
+fn level_operators_are_symmetric<const D: usize>(formulation: Formulation) {
     let mut solver = MultigridSolver::default();
     solver.prepare(&problem::<D>(formulation)).unwrap();
     let mut levels = solver.cycle.unwrap().levels;

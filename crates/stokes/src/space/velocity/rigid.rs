@@ -3,7 +3,7 @@
 use std::ops::Range;
 
 use gluey_fem::NodeMap;
-use gluey_geom::{Dim, Space, Spin, Vector};
+use gluey_geom::{Dim, Spin, Vector};
 use gluey_levelset::Body;
 use gluey_linalg::Scalar;
 use gluey_parallel::Halo;
@@ -62,10 +62,7 @@ pub fn add_moment<T: Scalar, const D: usize>(arm: &Vector<D>, f: &[T], load: &mu
 }
 
 /// The `D x RIGID` matrix that maps a twist to the velocity at `arm`, row-major.
-pub fn rigid_matrix<const D: usize>(arm: &Vector<D>) -> Vec<f64>
-where
-    Dim<D>: Space<D>,
-{
+pub fn rigid_matrix<const D: usize>(arm: &Vector<D>) -> Vec<f64> {
     let n = Dim::<D>::RIGID;
     let mut rows = vec![0.0; D * n];
     for c in 0..D {
@@ -88,10 +85,7 @@ pub fn gram_inverses<const D: usize>(
     rigid: &[RigidNode<D>],
     own: &Range<usize>,
     halo: &mut Halo,
-) -> Vec<Option<Vec<f64>>>
-where
-    Dim<D>: Space<D>,
-{
+) -> Vec<Option<Vec<f64>>> {
     let n = Dim::<D>::RIGID;
     let mut grams = vec![0.0; body_count * n * n];
     for r in rigid.iter().filter(|r| own.contains(&(r.node as usize))) {

@@ -1,14 +1,11 @@
 //! The bodies' entries of reduced vectors: twists, forces and torques, and twists that are data.
 
-use gluey_geom::{Dim, Space, Twist, Wrench};
+use gluey_geom::{Dim, Twist, Wrench};
 use gluey_linalg::Scalar;
 
 use super::VelocitySpace;
 
-impl<const D: usize> VelocitySpace<D>
-where
-    Dim<D>: Space<D>,
-{
+impl<const D: usize> VelocitySpace<D> {
     /// The twist of a body in a reduced vector.
     pub fn twist<T: Scalar>(&self, x: &[T], body: usize) -> Twist<D> {
         let entries = &x[self.full_dim() + body * Dim::<D>::RIGID..][..Dim::<D>::RIGID];
@@ -51,7 +48,7 @@ where
 
     /// Force and torque on a body from its rows of a reduced load.
     pub fn wrench_of(&self, rows: &[f64], body: usize) -> Wrench<D> {
-        let mut wrench = Wrench::default();
+        let mut wrench = Wrench::<D>::default();
         wrench.force.copy_from_slice(&rows[..D]);
         for k in 0..Dim::<D>::ROT {
             wrench.torque[k] = rows[D + k] * self.radius[body];
@@ -120,10 +117,7 @@ mod tests {
     }
 
     /// The load of a wrench does the work of the wrench.
-    fn wrenches_work<const D: usize>()
-    where
-        Dim<D>: Space<D>,
-    {
+    fn wrenches_work<const D: usize>() {
         let space = space::<D>();
         let (mut twist, mut wrench) = (Twist::default(), Wrench::default());
         twist.velocity = Vector::<D>::from_fn(|d, _| 0.3 - d as f64);
