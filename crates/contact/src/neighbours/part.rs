@@ -11,7 +11,7 @@ use super::{AffineFit, NeighbourList, frame_of_step, wrap};
 use crate::broadphase::Broadphase;
 use crate::{Domain, StepGeometry, Wall};
 
-/// What a search among the particles of a rank needs.
+/// Input of a search among the particles of a rank.
 pub(crate) struct PartSearch<'a, const D: usize> {
     pub ownership: &'a mut Ownership,
     /// Displacements without contact, by particle.

@@ -20,7 +20,7 @@ pub(crate) struct SearchedMoves<const D: usize> {
     pub widening: f64,
 }
 
-/// One rank among those that share a step.
+/// A rank among those that share a step.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct RankOf {
     /// Its number, from zero.

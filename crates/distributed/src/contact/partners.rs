@@ -18,7 +18,7 @@ pub(super) struct Sharers<'a, const D: usize> {
     buffer: RefCell<Vec<f64>>,
 }
 
-/// Who sends what to whom, and which particles that are.
+/// Messages between ranks, and the particles that they are of.
 struct Border {
     plan: GhostPlan,
     /// Place among the values, and particle.

@@ -21,7 +21,7 @@ pub struct SharedSuspension<const D: usize> {
     pub suspension: Suspension<D>,
 }
 
-/// Why there is no flow around the particles.
+/// Reason why there is no flow around the particles.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum SuspensionError {
     /// The box has no mesh.

@@ -63,7 +63,7 @@ impl<const D: usize> CutMoments<D> {
     }
 }
 
-/// What moments of all cells with the same shear are integrated with.
+/// Rules that moments of all cells with the same shear are integrated with.
 pub struct CutRules<const D: usize> {
     shear: f64,
     /// Integrals over all of a cell.

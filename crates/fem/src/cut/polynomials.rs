@@ -27,7 +27,7 @@ pub fn integrals(x: f64) -> Line {
     [x, (p2 - 1.0) / 6.0, (p3 - s) / 10.0, (p4 - p2) / 14.0, (p5 - p3) / 18.0]
 }
 
-/// What Lagrange polynomials `l_i` of the Gauss points `x_j` are.
+/// Lagrange polynomials `l_i` of the Gauss points `x_j`.
 pub struct Polynomials {
     /// Coefficients `c_ik` of `l_i = sum_k c_ik P_k`.
     pub coefficients: [Line; POINTS],

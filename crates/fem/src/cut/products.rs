@@ -49,7 +49,7 @@ pub struct Products<const D: usize> {
     places: Places,
 }
 
-/// Where pairs of nodes are among the products: they are ordered by the pairs of their places in the first
+/// Places of pairs of nodes among the products, which are ordered by the pairs of their places in the first
 /// direction, then in the second and so on.
 #[derive(Clone, Debug)]
 pub struct Places {

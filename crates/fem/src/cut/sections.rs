@@ -43,7 +43,7 @@ pub struct Sections<const D: usize> {
     pub polynomials: Polynomials,
 }
 
-/// What rays in one direction add to: Legendre sums, planes by their height.
+/// Sums that rays in one direction add to: Legendre sums, planes by their height.
 struct Sums {
     volume: [Plane; POINTS],
     flats: Vec<[Plane; POINTS]>,

@@ -35,7 +35,7 @@ pub struct Slice {
     pub edges: Vec<Edge>,
 }
 
-/// Where a ray enters or leaves.
+/// Point where a ray enters or leaves.
 #[derive(Clone, Copy, Debug)]
 pub struct End {
     /// Coordinate along the ray.

@@ -31,7 +31,7 @@ pub struct ViscousWeights<'a, const D: usize> {
     pub penalty: f64,
 }
 
-/// What viscous matrices are made with.
+/// Tables that viscous matrices are made with.
 #[derive(Clone, Debug)]
 pub struct ViscousMatrices<const D: usize> {
     shear: f64,

@@ -2,7 +2,7 @@
 
 use crate::scalar::Scalar;
 
-/// Why a dense block has no inverse.
+/// Reason why a dense block has no inverse.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum BlockError {
     /// A Cholesky pivot is not positive, or not a number.

@@ -265,7 +265,7 @@ impl<T: Scalar, S: Scalar, Z: Scalar> Gcr<T, S, Z> {
     }
 }
 
-/// How far a solve has come.
+/// State of a solve: how far it has come.
 struct Progress {
     iterations: usize,
     /// Norm of the true residual.
@@ -274,7 +274,7 @@ struct Progress {
     stage: StageEnd,
 }
 
-/// How a stage ended.
+/// End of a stage.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum StageEnd {
     Regular,

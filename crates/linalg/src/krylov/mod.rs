@@ -38,7 +38,7 @@ pub struct KrylovReport {
     pub reference_norm: f64,
 }
 
-/// Why a Krylov method gave up.
+/// Reason why a Krylov method gave up.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum KrylovError {
     /// The residual is still too large.

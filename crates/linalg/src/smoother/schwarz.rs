@@ -40,7 +40,7 @@ pub struct SchwarzPatches<T, const B: usize> {
     z: Vec<f32>,
 }
 
-/// Where the weights of a node stand.
+/// Places of the weights of a node.
 #[derive(Clone, Copy, PartialEq)]
 enum Weights {
     /// Their roots before and after the inverses.
