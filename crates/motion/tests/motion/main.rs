@@ -1,4 +1,4 @@
-//! Integrators, films and mobilities beside exact trajectories and small steps.
+//! Integrators and mobilities beside exact trajectories and each other.
 
 #![allow(clippy::unwrap_used, reason = "a failure here is a failing test")]
 
