@@ -28,10 +28,9 @@ pub struct Dim<const D: usize>;
 
 impl<const D: usize> Dim<D> {
     /// Number of rotational degrees of freedom: 1 in 2D, 3 in 3D.
-    pub const ROT: usize = match D {
-        2 => 1,
-        3 => 3,
-        _ => panic!("space has two or three dimensions"),
+    pub const ROT: usize = {
+        assert!(D == 2 || D == 3, "space has two or three dimensions");
+        D * (D - 1) / 2
     };
     /// Number of rigid-body degrees of freedom: 3 in 2D, 6 in 3D.
     pub const RIGID: usize = D + Self::ROT;

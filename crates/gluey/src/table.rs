@@ -7,9 +7,9 @@ pub use crate::interpolate::linear;
 /// Numbers in columns with names.
 ///
 /// ```
-/// use gluey::table::{Table, linear};
+/// use gluey::table::{NumberTable, linear};
 ///
-/// let table = Table::parse("# a comment\nt, x1\n0, 0.3\n2, 0.5\n")?;
+/// let table = NumberTable::parse("# a comment\nt, x1\n0, 0.3\n2, 0.5\n")?;
 /// let (t, x) = (table.column("t")?, table.column("x1")?);
 /// assert_eq!(linear(t, |row| x[row], 1.0), Some(0.4));
 /// # Ok::<(), gluey::table::TableError>(())
