@@ -24,8 +24,8 @@ use crate::{Contact, ContactError, ContactReport, PairState};
 pub use crate::pair_contact::{Centers, PartContact};
 pub use partition::RankOf;
 
-/// Questions of a rank to the others with whom it shares contacts. All ranks call the same methods in the same
-/// order.
+/// Questions of a rank to the others with whom it shares contacts. All ranks call the same methods in the
+/// same order.
 pub trait Partners<const D: usize> {
     /// The number of this rank, from zero.
     fn rank(&self) -> usize;

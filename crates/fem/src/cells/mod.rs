@@ -42,7 +42,7 @@ use varying::PointRule;
 /// Cells are padded to multiples of this, the largest number of lanes.
 const GROUP: usize = 16;
 
-/// One cell of the operator: the viscous matrix `viscous K + K(eta)` and the divergence `divergence B`.
+/// A cell of the operator: the viscous matrix `viscous K + K(eta)` and the divergence `divergence B`.
 #[derive(Clone, Copy, Debug)]
 pub struct CellData<'a> {
     /// Index in the mesh.

@@ -26,7 +26,7 @@ pub use problem::{FlowData, Method, Problem, check_viscosity, symmetric, symmetr
 #[cfg(test)]
 pub use unfitted::Unfitted;
 
-/// How rigidity is imposed.
+/// Formulation: the way in which rigidity is imposed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Formulation {
     /// Penalty and Uzawa multiplier of the paper.
