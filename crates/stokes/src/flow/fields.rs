@@ -61,11 +61,7 @@ fn push_point<const D: usize>(
     fields.multiplier.push(at_node(&flow.multiplier));
     fields.pressure.push(pressure);
     fields.level_set.push(alpha);
-    fields.viscosity.push(viscosity(flow, params, alpha));
-}
-
-fn viscosity<const D: usize>(flow: &Flow<D>, params: &FlowParams, alpha: f64) -> f64 {
-    match params.formulation {
+    fields.viscosity.push(match params.formulation {
         Formulation::Unfitted { .. } => params.viscosity,
         #[cfg(feature = "paper")]
         Formulation::Paper(paper) => {
@@ -74,5 +70,5 @@ fn viscosity<const D: usize>(flow: &Flow<D>, params: &FlowParams, alpha: f64) ->
             let law = ViscosityLaw { fluid: params.viscosity, ratio: paper.viscosity_ratio };
             law.mix(ramp.fraction(alpha))
         }
-    }
+    });
 }
