@@ -37,7 +37,7 @@ const UNFITTED_BARE: Method = Method {
 };
 
 /// What chapters without thin films compare. Another one is a line here and in [`FILM_METHODS`], and in
-/// [`IN_SHEARED_BOXES`] if it knows them; its limits are lines of `limits.csv`.
+/// `IN_SHEARED_BOXES` if it knows them; its limits are lines of `limits.csv`.
 pub const METHODS: &[Method] = &[PAPER, UNFITTED];
 
 /// Those of [`METHODS`] that know boxes that are sheared for ever.

@@ -271,7 +271,7 @@ impl<const D: usize> Problem<D> {
     /// those whose twists the rank owns; no entries stand for none on any.
     ///
     /// # Errors
-    /// [`StokesError::Count`] unless there is one entry per body, and those of [`Rigidity::add_wrenches`].
+    /// [`StokesError::Count`] unless there is one entry per body, and those of the formulation.
     pub fn add_wrenches(&self, wrenches: &[Wrench<D>], b: &mut [f64]) -> Result<(), StokesError> {
         if wrenches.is_empty() {
             return Ok(());
@@ -384,7 +384,7 @@ impl<const D: usize> Problem<D> {
     /// Velocity and spin of each body in a field that [`Problem::velocity`] gave. All ranks call this.
     ///
     /// # Errors
-    /// Those of [`Rigidity::twists`].
+    /// For a body that the field does not know.
     pub fn twists(&self, velocity: &[f64]) -> Result<Vec<Twist<D>>, StokesError> {
         let (mesh, near) = (self.discretisation(), self.rigidity.twists(self, velocity)?);
         Ok(mesh.sums_of_bodies(mesh.of_owned(&near)))

@@ -165,7 +165,7 @@ impl<const D: usize> StokesSystem<D> {
     /// `None` without films. All ranks call this.
     ///
     /// # Errors
-    /// Those of [`FilmNetwork::new`].
+    /// If the block of a body is not positive definite, on all ranks.
     pub fn film_network(&self) -> Result<Option<FilmNetwork>, DirectError> {
         let own = self.films().map_or_else(Vec::new, |films| films.rows_of_motion(self.space.full_dim()));
         let Some(partition) = self.discretisation().partition() else {

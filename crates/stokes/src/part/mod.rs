@@ -41,7 +41,7 @@ pub fn rings_around_surfaces<const D: usize>(
     RINGS[D - 2] + (widest / cell_size).ceil() as usize
 }
 
-/// Numbers that [`NodalFields::films`] has for a film: a body, its partner (negative for walls), and vectors.
+/// Numbers that `NodalFields::films` has for a film: a body, its partner (negative for walls), and vectors.
 pub fn numbers_of_film<const D: usize>() -> usize {
     FilmCoupling::<D>::KEPT
 }
