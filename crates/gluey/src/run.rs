@@ -166,20 +166,9 @@ where
     C: Surrounded<D>,
     HydrodynamicsError: From<H::Error>,
 {
-    /// At time 0, or at the checkpoint to resume.
+    /// At time 0, or at the checkpoint to resume. No rank sends or waits for messages here: they agree on the
+    /// outcome.
     fn start(
-        case: &'a Case,
-        options: &'a RunOptions,
-        progress: &'a dyn Progress,
-        hydrodynamics: H,
-        contact: C,
-        sharing: &'a RunRanks<'a>,
-    ) -> Result<Self, RunError> {
-        sharing.agreed(Self::start_here(case, options, progress, hydrodynamics, contact, sharing))
-    }
-
-    /// The same on this rank, which neither sends nor waits for messages.
-    fn start_here(
         case: &'a Case,
         options: &'a RunOptions,
         progress: &'a dyn Progress,

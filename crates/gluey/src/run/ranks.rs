@@ -57,8 +57,8 @@ fn run_beside<const D: usize>(
     let prepared = sharing.agreed(prepared)?;
     let log = prepared.as_ref().map(|(_, log)| log);
     let listener = log.map_or(&Silent as &dyn Progress, |log| log);
-    let outcome = RunInProgress::start(case, options, listener, flow, contact, &sharing)
-        .and_then(RunInProgress::finish);
+    let started = RunInProgress::start(case, options, listener, flow, contact, &sharing);
+    let outcome = sharing.agreed(started).and_then(RunInProgress::finish);
     log.into_iter().for_each(|log| log.end(&outcome));
     outcome
 }
