@@ -49,6 +49,11 @@ mod tests {
         sorted.sort_unstable();
         assert_eq!(elsewhere().of_all(told), infeasible(&sorted), "all pairs, each once");
         assert_eq!(elsewhere().of_all([None, Some(given.clone())]), given, "the first that is known");
+        assert_eq!(
+            PartFailure::Here(given.clone()).of_all([None, None]),
+            given,
+            "its own where none is told"
+        );
         let message = "no memory".to_owned();
         assert_eq!(elsewhere().of_all([None, None]), ContactError::Elsewhere { message });
     }

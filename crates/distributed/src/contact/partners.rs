@@ -121,3 +121,34 @@ pub(super) fn all_of<T: Serialize + DeserializeOwned>(ranks: &Ranks, own: &T) ->
     let all: Vec<u8> = ranks.all_gather(&words).into_iter().flat_map(u64::to_le_bytes).collect();
     all.chunks_exact((8 * most).max(1)).map(|bytes| postcard::from_bytes(bytes).expect(WHY)).collect()
 }
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used, reason = "a failure here is a failing test")]
+mod tests {
+    use gluey_contact::solver::ResidualHistory;
+    use gluey_contact::{ContactError, PairKey};
+    use gluey_parallel::Threads;
+
+    use super::*;
+
+    #[test]
+    fn errors_arrive_as_they_were_sent() {
+        let pairs = [PairKey::across(7, 3, [1, -2, 0]), PairKey::new(0, 1), PairKey::wall(4, 1)];
+        let [pair, worst, _] = pairs;
+        let history = ResidualHistory { entries: vec![(1, 0.5), (2, 1e-3)] };
+        let errors = [
+            ContactError::BadStep { velocity_weight: 0.0, dt: 0.0 },
+            ContactError::Coincident { pair },
+            ContactError::Given { pair: pairs[2], gap: -0.25 },
+            ContactError::GapNotClosed { pair, gap: 1e-9, passes: 7 },
+            ContactError::Infeasible { pairs: pairs.to_vec() },
+            ContactError::NotConverged { residual: 1e-3, tolerance: 1e-13, iterations: 9, history, worst },
+        ];
+        // Of other lengths on each rank, and none on some.
+        let own = |rank: usize| (rank != 1).then(|| errors[2 * rank].clone());
+        let all = Threads::run(3, |ranks| all_of(ranks, &own(ranks.rank()))).unwrap();
+        assert_eq!(all, vec![[0, 1, 2].map(own).to_vec(); 3]);
+        let all = Threads::run(2, |ranks| all_of(ranks, &errors.to_vec())).unwrap();
+        assert_eq!(all, vec![vec![errors.to_vec(); 2]; 2]);
+    }
+}
