@@ -194,6 +194,18 @@ pub enum ContactError {
         /// The pair with the largest residual.
         worst: PairKey,
     },
+    /// The forces of contacts and the flow in which they act do not come to an agreement.
+    #[error(
+        "the contact forces still change by {} of themselves after {} flows of a step (tolerance {tolerance}); the \
+         changes were {changes:?}",
+        changes.last().copied().unwrap_or(0.0), changes.len()
+    )]
+    FlowNotConverged {
+        /// Changes by each flow, over the forces.
+        changes: Vec<f64>,
+        /// The change that was to be reached.
+        tolerance: f64,
+    },
     /// Re-linearisation did not close a gap.
     #[error("the gap {gap:e} of {pair} is still off after {passes} linearisations")]
     GapNotClosed {

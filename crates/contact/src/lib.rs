@@ -39,13 +39,16 @@
 //!
 //! Where lubrication acts, [`FilmMemory`] keeps films open before contact is corrected for.
 //!
-//! Not for frictional contact, and not for particles that are soft on the scale of the gaps.
+//! [`FlowContact`] is for contacts whose forces act in a flow, with roughness and friction.
+//!
+//! Not for particles that are soft on the scale of the gaps.
 
 pub mod broadphase;
 mod delassus;
 mod domain;
 mod error;
 mod films;
+mod flow_contact;
 mod grid;
 mod island_projection;
 mod islands;
@@ -73,10 +76,14 @@ pub use gluey_geom as geom;
 pub use domain::{Domain, Wall};
 pub use error::ContactError;
 pub use films::{Film, FilmError, FilmMemory, FilmReport, GapReport, film_reach};
+pub use flow_contact::{FlowContact, FlowContactParams, Friction, NormalLaw};
 pub use key::{PairKey, Partner};
-pub use memory::{ContactState, MemoryError, PairState};
-pub use mobility::{Mobility, StokesDrag, WithFixed};
-pub use model::{BodyStep, Contact, ContactModel, ContactReport, StepGeometry, WorstPair};
+pub use memory::{ContactState, ForceState, MemoryError, PairState};
+pub use mobility::{LoneDrag, Mobility, StokesDrag, TwistMobility, WithFixed};
+pub use model::{
+    BodyStep, Contact, ContactForce, ContactModel, ContactReport, FlowContactReport, FlowForces,
+    StepGeometry, WorstPair,
+};
 pub use network::{Cluster, Clusters, ContactArm, ContactNetwork, Coordination};
 pub use pair_contact::PairContact;
 pub use params::{ContactLaw, ContactParams, GammaUpdate, SolverKind, UnknownName};

@@ -35,6 +35,21 @@ pub struct MemoryError {
 pub struct ContactState {
     /// The pairs.
     pub pairs: Vec<PairState>,
+    /// Forces of contacts that act in the flow.
+    pub in_flow: Vec<ForceState>,
+}
+
+/// Force of a contact that acts in the flow, with the line of centres that it belongs to; in 2D the third
+/// components are zero.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(Serialize, Deserialize))]
+pub struct ForceState {
+    /// The two particles.
+    pub pair: PairKey,
+    /// From the first to its partner, of length one.
+    pub normal: [f64; 3],
+    /// Force on the partner.
+    pub force: [f64; 3],
 }
 
 impl ContactState {
@@ -63,6 +78,12 @@ impl ContactState {
         if let Some(&PairState { pair, gamma, lambda }) = self.pairs.iter().find(|state| !is_good(state)) {
             return Err(MemoryError { pair, gamma, lambda });
         }
+        let is_finite = |state: &ForceState| state.force.iter().chain(&state.normal).all(|x| x.is_finite());
+        if let Some(&ForceState { pair, force, .. }) = self.in_flow.iter().find(|state| !is_finite(state)) {
+            return Err(MemoryError { pair, gamma: 0.0, lambda: force.iter().sum() });
+        }
+        self.in_flow.sort_unstable_by_key(|state| state.pair);
+        self.in_flow.dedup_by_key(|state| state.pair);
         self.pairs.retain(|state| state.gamma < 0.0 || state.lambda != 0.0);
         self.pairs.sort_unstable_by_key(|state| state.pair);
         self.pairs.dedup_by_key(|state| state.pair);

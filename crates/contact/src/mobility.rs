@@ -1,6 +1,10 @@
 //! The mobility, by which contact forces change velocities: `u - u* = M^-1 f`.
 
-use gluey_geom::Vector;
+use std::f64::consts::PI;
+
+use gluey_geom::{Twist, Vector, Wrench};
+
+use crate::PairKey;
 
 /// A symmetric positive semidefinite mobility `M^-1`, the metric of the projection.
 ///
@@ -54,5 +58,64 @@ impl WithFixed {
 impl<const D: usize> Mobility<D> for WithFixed {
     fn own(&self, particle: usize, radius: f64) -> f64 {
         if self.fixed.get(particle).copied().unwrap_or(false) { 0.0 } else { 1.0 / radius }
+    }
+}
+
+/// Motions that forces and torques give to particles, symmetric and positive semidefinite: particles that are
+/// held have none. Forces are in units of viscosity times length times velocity, per length in 2D.
+pub trait TwistMobility<const D: usize> {
+    /// Writes the motions that these loads give to the particles.
+    fn respond(&mut self, loads: &[Wrench<D>], twists: &mut [Twist<D>]);
+
+    /// Velocity of the partner's surface beyond the particle's, along the line of centres and across it, for
+    /// a unit force between the two in the middle of their gap, as if nobody else were there.
+    fn of_pair(&self, pair: PairKey) -> [f64; 2];
+}
+
+/// Particles each of which feels the drag that it has alone: `6 pi eta a` and `8 pi eta a^3` for spheres,
+/// `4 pi eta` and `4 pi eta a^2` for discs, whose drag depends on the logarithm of how far the fluid reaches.
+#[derive(Clone, Debug)]
+pub struct LoneDrag<'a> {
+    /// Viscosity of the fluid.
+    pub viscosity: f64,
+    /// Radii.
+    pub radii: &'a [f64],
+    /// Whether a particle moves as it is told; no entries where none does.
+    pub is_held: &'a [bool],
+}
+
+impl LoneDrag<'_> {
+    /// Force per velocity, and torque per spin times the square of the radius, of a particle of this radius.
+    pub fn of<const D: usize>(viscosity: f64, radius: f64) -> [f64; 2] {
+        match D {
+            2 => [4.0 * PI * viscosity; 2],
+            _ => [6.0 * PI * viscosity * radius, 8.0 * PI * viscosity * radius],
+        }
+    }
+
+    /// Velocities per force, and per torque over the square of the radius.
+    fn mobilities<const D: usize>(&self, particle: usize) -> [f64; 2] {
+        match self.is_held.get(particle) {
+            Some(true) => [0.0; 2],
+            _ => Self::of::<D>(self.viscosity, self.radii[particle]).map(f64::recip),
+        }
+    }
+}
+
+impl<const D: usize> TwistMobility<D> for LoneDrag<'_> {
+    fn respond(&mut self, loads: &[Wrench<D>], twists: &mut [Twist<D>]) {
+        for (particle, (twist, load)) in twists.iter_mut().zip(loads).enumerate() {
+            let [moving, turning] = self.mobilities::<D>(particle);
+            let spin = load.torque * (turning / self.radii[particle].powi(2));
+            *twist = Twist { velocity: load.force * moving, spin };
+        }
+    }
+
+    fn of_pair(&self, pair: PairKey) -> [f64; 2] {
+        let (first, second) = pair.particles();
+        let of_sides = [Some(first), second].into_iter().flatten().map(|k| self.mobilities::<D>(k));
+        // The arm is about a radius.
+        of_sides
+            .fold([0.0; 2], |[along, across], [moving, turning]| [along + moving, across + moving + turning])
     }
 }

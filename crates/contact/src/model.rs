@@ -1,11 +1,11 @@
 //! The interface of contact models: the step they correct, and the report on it.
 
-use gluey_geom::{Pose, Twist, Vector};
+use gluey_geom::{Matrix, Pose, Twist, Vector, Wrench};
 #[cfg(feature = "serde")]
 use serde::{Deserialize, Serialize};
 
 use crate::projection::Effort;
-use crate::{ContactError, ContactState, Domain, MemoryError, PairKey, Wall};
+use crate::{ContactError, ContactState, Domain, MemoryError, PairKey, TwistMobility, Wall};
 
 /// The step `x^{n+1} = x^n + c u^n + drift` whose velocities are to be corrected. One entry per particle.
 #[derive(Clone, Copy, Debug)]
@@ -70,6 +70,97 @@ pub trait ContactModel<const D: usize> {
     /// Tells how the images across the border in `y` slide: their tilt at the beginning of the next step and
     /// its growth in the step, lengths along `x` (see [`Domain`]). Models without periods have none that do.
     fn set_sliding(&mut self, _tilt: f64, _tilt_step: f64) {}
+
+    /// The forces that act in the flow, of a model that has such; [`ContactModel::correct_bodies`] is not
+    /// called then.
+    fn in_flow(&mut self) -> Option<&mut dyn FlowForces<D>> {
+        None
+    }
+}
+
+/// Contacts whose forces act in the flow of a step. The flow with the forces of before gives motions,
+/// [`FlowForces::correct`] forces that keep bodies apart and motions with these, and so on until the forces
+/// no longer change; [`FlowForces::finish`] ends the step.
+pub trait FlowForces<const D: usize> {
+    /// Tells how the surroundings move: tilt and its growth as [`ContactModel::set_sliding`], and by which
+    /// factor walls move along themselves, 1 as given and -1 reversed.
+    fn set_surroundings(&mut self, tilt: f64, tilt_step: f64, shear_factor: f64);
+
+    /// Tells the rate by which velocities and forces count now, over that by which the critical load does.
+    fn set_rate(&mut self, rate: f64);
+
+    /// Begins a step with the forces of the last one, turned with the lines of centres.
+    ///
+    /// # Errors
+    /// Those of pairs that are not there.
+    fn begin(&mut self, step: &BodyStep<'_, D>) -> Result<(), ContactError>;
+
+    /// The forces, sorted by pair.
+    fn forces(&self) -> &[ContactForce<D>];
+
+    /// Minus the mean product of the forces, normal and tangential ones, and the lines between centres, its
+    /// symmetric part, in a box that is periodic in all directions.
+    fn stresses(&self) -> [Matrix<D>; 2];
+
+    /// What the forces load the particles of a step with.
+    ///
+    /// # Errors
+    /// Those of pairs that are not there.
+    fn loads(&self, step: &BodyStep<'_, D>) -> Result<Vec<Wrench<D>>, ContactError>;
+
+    /// Corrects `twists`, those of a flow in which the forces act, so that no gap is below the smallest one
+    /// at the end of the step, with the forces that this takes in this mobility.
+    ///
+    /// # Errors
+    /// [`ContactError`]; twists and forces are as before then.
+    fn correct(
+        &mut self,
+        step: &BodyStep<'_, D>,
+        mobility: &mut dyn TwistMobility<D>,
+        twists: &mut [Twist<D>],
+    ) -> Result<FlowContactReport, ContactError>;
+
+    /// Ends a step: remembers what its last correction found.
+    fn finish(&mut self);
+}
+
+/// The force of a contact.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ContactForce<const D: usize> {
+    /// The two particles.
+    pub pair: PairKey,
+    /// From the first to its partner, of length one.
+    pub normal: Vector<D>,
+    /// Force on the partner; the first has the opposite one. Both act in the middle of the gap. Unit: that of
+    /// the mobility, viscosity times length times velocity (viscosity times velocity in 2D).
+    pub force: Vector<D>,
+    /// From the centre of the first to that of its partner, or to the wall.
+    pub branch: Vector<D>,
+    /// Velocity of the partner's surface beyond that of the first, across the normal.
+    pub slip: Vector<D>,
+    /// Gap at the end of the step.
+    pub gap: f64,
+}
+
+impl<const D: usize> ContactForce<D> {
+    /// The normal force, positive apart.
+    pub fn pressing(&self) -> f64 {
+        self.normal.dot(&self.force)
+    }
+
+    /// The tangential force on the partner.
+    pub fn tangential(&self) -> Vector<D> {
+        self.force - self.normal * self.pressing()
+    }
+}
+
+/// Report on a correction.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct FlowContactReport {
+    /// Effort and outcome.
+    pub contact: ContactReport,
+    /// Change of the forces against those of the flow, over their size, by the power that they have.
+    pub change: f64,
 }
 
 /// A contact at the end of a step.
@@ -111,6 +202,8 @@ pub struct ContactReport {
     pub pair_count: usize,
     /// Pairs with a force.
     pub active_count: usize,
+    /// Those of them whose friction is all that their cone allows: they slip. None where no law has friction.
+    pub sliding_count: usize,
     /// The smallest gap among the pairs that took part.
     pub worst: Option<WorstPair>,
 }
@@ -130,6 +223,7 @@ impl ContactReport {
             residual: self.residual.max(other.residual),
             pair_count: self.pair_count + other.pair_count,
             active_count: self.active_count + other.active_count,
+            sliding_count: self.sliding_count + other.sliding_count,
             worst,
         }
     }

@@ -255,6 +255,9 @@ impl MemoryArrays<'_> {
             };
             Ok(PairState { pair: key, gamma: gamma[k], lambda: force[k] })
         };
-        Ok(ContactState { pairs: (0..first.len()).map(pair).collect::<PyResult<_>>()? })
+        Ok(ContactState {
+            pairs: (0..first.len()).map(pair).collect::<PyResult<_>>()?,
+            ..ContactState::default()
+        })
     }
 }

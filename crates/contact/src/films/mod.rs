@@ -70,12 +70,14 @@ pub struct FilmReport {
 }
 
 /// Report on the gaps of a step: those of films, then those of contacts.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct GapReport {
     /// Films.
     pub films: FilmReport,
     /// Contacts.
     pub contacts: ContactReport,
+    /// Of contacts whose forces act in the flow, their change by each flow of the step.
+    pub changes: Vec<f64>,
 }
 
 impl FilmMemory {

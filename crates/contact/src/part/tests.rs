@@ -146,7 +146,8 @@ fn memory_goes_with_the_first_particle() {
     let mut contact = PairContact::new(ContactParams::default()).within(cloud.domain.clone());
     let state = |k: usize| crate::PairState { pair: PairKey::new(k, 199 - k), gamma: -0.1, lambda: k as f64 };
     let pairs = (0..100).map(state).collect();
-    crate::ContactModel::resume(&mut contact, crate::ContactState { pairs }).expect("a memory");
+    crate::ContactModel::resume(&mut contact, crate::ContactState { pairs, ..Default::default() })
+        .expect("a memory");
     let mut found = 0;
     for RankShare { rank, particles, memory } in &cloud.shares(contact, &[8])[0] {
         for of in memory {

@@ -168,13 +168,14 @@ fn too_few_linearisations_are_told() {
 #[test]
 fn memories_that_no_step_leaves_are_refused() {
     let pair = PairKey::new(0, 1);
-    let good = ContactState { pairs: vec![PairState { pair, gamma: -1.0, lambda: 0.5 }] };
+    let good =
+        ContactState { pairs: vec![PairState { pair, gamma: -1.0, lambda: 0.5 }], ..ContactState::default() };
     for (gamma, lambda) in
         [(1e-9, 0.0), (f64::NAN, 0.0), (f64::NEG_INFINITY, 0.0), (-1.0, f64::NAN), (0.0, f64::INFINITY)]
     {
         let mut contact = PairContact::<2>::new(ContactParams::default());
         contact.resume(good.clone()).expect("a memory");
-        let bad = ContactState { pairs: vec![PairState { pair, gamma, lambda }] };
+        let bad = ContactState { pairs: vec![PairState { pair, gamma, lambda }], ..ContactState::default() };
         let error = contact.resume(bad).expect_err("must be refused");
         assert_eq!(error.pair, pair);
         assert!(error.to_string().contains("particles 1 and 2"), "{error}");

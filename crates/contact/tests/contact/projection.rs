@@ -76,7 +76,10 @@ impl<const D: usize> Packing<D> {
 
     fn memory(&self) -> ContactState {
         let pairs = self.glued.iter();
-        ContactState { pairs: pairs.map(|&pair| PairState { pair, gamma: -1.0, lambda: 0.0 }).collect() }
+        ContactState {
+            pairs: pairs.map(|&pair| PairState { pair, gamma: -1.0, lambda: 0.0 }).collect(),
+            ..ContactState::default()
+        }
     }
 
     /// Corrected velocities, and the model for its contacts.

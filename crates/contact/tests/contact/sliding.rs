@@ -301,7 +301,10 @@ fn a_glued_pair_turns_across_the_border<const D: usize>() {
     suspension.particles[1].pose.position = branch - suspension.domain.shift(&image);
     let pair = PairKey::across(0, 1, image);
     let start = -50.0;
-    let state = ContactState { pairs: vec![PairState { pair, gamma: start, lambda: 0.0 }] };
+    let state = ContactState {
+        pairs: vec![PairState { pair, gamma: start, lambda: 0.0 }],
+        ..ContactState::default()
+    };
     suspension.contact.resume(state).expect("a memory");
     let (mut least, mut most) = (start, start);
     for n in 0..5000 {

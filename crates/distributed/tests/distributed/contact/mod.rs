@@ -215,7 +215,7 @@ fn memory_reaches_across_ranks() {
     let far = |first: u32, index: u32| PairKey { first, second: Partner::Particle { index, image: [0; 3] } };
     let state = |(k, pair): (u32, PairKey)| PairState { pair, gamma: -1e-4 * f64::from(k), lambda: 1e-3 };
     let pairs = (0..40).map(|k| (k, far(k, 299 - 3 * k)));
-    setting.memory = ContactState { pairs: pairs.map(state).collect() };
+    setting.memory = ContactState { pairs: pairs.map(state).collect(), ..ContactState::default() };
     let serial = ranks_are_as_one("far pairs", &setting, [0.0; 3]);
     assert!(serial.reports[0].pair_count >= 40);
 }

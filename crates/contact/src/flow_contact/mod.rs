@@ -1,0 +1,403 @@
+//! Contacts whose forces act in the flow: rough surfaces with friction, or smooth ones with a memory.
+//!
+//! Rough surfaces come no nearer than their roughness. There they push each other by `F_n >= 0` and hold each
+//! other by `|F_t| <= mu F_n`, or slip. The fluid between them acts all the time, with the true gap: a force
+//! on a pair moves it by as little as the film between allows. So forces are sought in a mobility that has
+//! the films ([`TwistMobility`]), and act in the flow of the step: their own flow is a part of it.
+//!
+//! A step is an iteration. A flow with the forces of before gives motions; [`FlowContact::correct`] finds the
+//! forces with which the mobility keeps pairs apart; where these are others, a flow with them comes next.
+//! What the mobility lacks of the flow shrinks the change each time. From the third flow on Anderson's
+//! acceleration helps.
+
+mod anderson;
+mod near;
+mod params;
+mod solve;
+mod touch;
+
+use std::f64::consts::PI;
+
+use gluey_geom::{Dim, Matrix, Twist, Vector, Wrench};
+
+use crate::memory::GammaRule;
+use crate::model::validate;
+use crate::neighbours::NeighbourList;
+use crate::pair_contact::Centers;
+use crate::{
+    BodyStep, Contact, ContactError, ContactForce, ContactModel, ContactReport, ContactState, Domain,
+    FlowContactReport, FlowForces, ForceState, LoneDrag, MemoryError, PairKey, PairState, Partner,
+    StepGeometry, TwistMobility,
+};
+use anderson::Anderson;
+use near::{KnownForce, NearPairs};
+use solve::Outcome;
+use touch::Touch;
+
+pub use params::{FlowContactParams, Friction, NormalLaw};
+
+/// Flows that the acceleration remembers.
+const WINDOW: usize = 6;
+/// Tangential forces within this share of the most are at the edge of their cone.
+const AT_EDGE: f64 = 1e-9;
+/// Pairs are known up to this gap beyond the roughness, in mean radii, wherever forces push particles.
+const SPARE: f64 = 0.1;
+
+/// Contacts between discs or spheres, and with walls, whose forces act in the flow.
+#[derive(Debug)]
+pub struct FlowContact<const D: usize> {
+    params: FlowContactParams,
+    domain: Domain<D>,
+    walls_along: Vec<Vector<D>>,
+    shear_factor: f64,
+    rate: f64,
+    neighbours: NeighbourList<D>,
+    centers: Centers<D>,
+    forces: Vec<ContactForce<D>>,
+    /// Memory of smooth surfaces after the last step.
+    memory: ContactState,
+    /// The rule by which that changes in the step of the last correction.
+    rule: Option<GammaRule>,
+    contacts: Vec<Contact>,
+    /// Motions without the forces that the last correction began with, in the same step.
+    free: Option<Vec<Twist<D>>>,
+    acceleration: Anderson,
+}
+
+impl<const D: usize> FlowContact<D> {
+    /// Contacts within walls and periodic directions.
+    pub fn new(params: FlowContactParams, domain: Domain<D>) -> Self {
+        Self {
+            params,
+            domain,
+            walls_along: Vec::new(),
+            shear_factor: 1.0,
+            rate: 1.0,
+            neighbours: NeighbourList::default(),
+            centers: Centers::default(),
+            forces: Vec::new(),
+            memory: ContactState::default(),
+            rule: None,
+            contacts: Vec::new(),
+            free: None,
+            acceleration: Anderson::new(WINDOW),
+        }
+    }
+
+    /// The same with walls that move along themselves with these velocities, in their order.
+    #[must_use]
+    pub fn with_walls_along(self, velocities: Vec<Vector<D>>) -> Self {
+        Self { walls_along: velocities, ..self }
+    }
+
+    /// Walls and periods.
+    pub fn domain(&self) -> &Domain<D> {
+        &self.domain
+    }
+
+    /// Laws and tuning.
+    pub fn params(&self) -> &FlowContactParams {
+        &self.params
+    }
+
+    /// Force of a `lambda` of one.
+    fn unit(&self) -> f64 {
+        6.0 * PI * self.params.viscosity
+    }
+
+    /// The pair of this name, checked.
+    fn touch(&self, pair: PairKey, step: &BodyStep<'_, D>) -> Result<Touch<D>, ContactError> {
+        ContactError::unless_known(pair, step.poses.len(), self.domain.walls.len())?;
+        let touch = Touch::new(pair, step, &self.domain, self.params.roughness());
+        let mut touch = touch.ok_or(ContactError::Coincident { pair })?;
+        if let Partner::Wall(wall) = pair.second {
+            let along = self.walls_along.get(wall as usize).copied().unwrap_or_else(Vector::zeros);
+            touch.slide += along * self.shear_factor;
+        }
+        Ok(touch)
+    }
+
+    /// From the third flow on, goes on from a combination of the motions without forces.
+    fn accelerate(&mut self, step: &BodyStep<'_, D>, free: &mut [Twist<D>]) {
+        let Some(before) = &self.free else { return };
+        let numbers = |twist: &Twist<D>| {
+            let spin = Dim::<D>::spin_slice(&twist.spin).to_vec();
+            twist.velocity.iter().copied().chain(spin).collect::<Vec<f64>>()
+        };
+        let image: Vec<f64> = free.iter().flat_map(numbers).collect();
+        let change: Vec<Twist<D>> = free.iter().zip(before).map(|(free, before)| *free - *before).collect();
+        let touches = self.forces.iter().filter_map(|force| self.touch(force.pair, step).ok());
+        let residual: Vec<Vector<D>> = touches.map(|touch| touch.velocity(&change) - touch.slide).collect();
+        let next = self.acceleration.next(image, residual.iter().flatten().copied().collect());
+        let rigid = Dim::<D>::RIGID;
+        for (twist, numbers) in free.iter_mut().zip(next.chunks_exact(rigid)) {
+            twist.velocity = Vector::from_column_slice(&numbers[..D]);
+            (D..rigid).for_each(|k| twist.spin[k - D] = numbers[k]);
+        }
+    }
+
+    /// The pairs that are near, with the forces that keep them apart, and the motions with these.
+    fn solve(
+        &mut self,
+        step: &BodyStep<'_, D>,
+        geometry: &StepGeometry<'_, D>,
+        mobility: &mut dyn TwistMobility<D>,
+        free: &[Twist<D>],
+    ) -> Result<(NearPairs<D>, Outcome<D>), ContactError> {
+        validate(geometry, free, &self.domain)?;
+        let moves = step.moves(free);
+        self.neighbours.margin = 0.5 * (self.params.roughness() + SPARE);
+        self.neighbours.begin(geometry, &self.domain, &moves)?;
+        self.rule = match &self.params.law {
+            NormalLaw::Rough { .. } => None,
+            NormalLaw::Smooth(law) => Some(GammaRule::new(law, step.velocity_weight, step.dt)),
+        };
+        let mut known = self.known_forces();
+        loop {
+            let mut near = self.near(step, mobility, &known)?;
+            let outcome = near.solve(step, &self.params, self.rate, mobility, free)?;
+            let moved = step.moves(&outcome.twists);
+            let order = self.neighbours.order.iter();
+            let by_place: Vec<Vector<D>> = order.map(|&particle| moved[particle as usize]).collect();
+            if self.neighbours.is_sufficient(&self.domain, geometry, &by_place) {
+                return Ok((near, outcome));
+            }
+            known = near.forces_by_pair();
+            self.neighbours.extend(geometry, &self.domain, &moves, &moved)?;
+        }
+    }
+
+    /// The pairs with a force or a memory, sorted.
+    fn known_forces(&self) -> Vec<KnownForce<D>> {
+        let forces = self.forces.iter().map(|force| KnownForce { pair: force.pair, force: force.force });
+        let has_force = |pair| self.forces.binary_search_by_key(&pair, |force| force.pair).is_ok();
+        let remembered = self.memory.pairs.iter().filter(|state| !has_force(state.pair));
+        let remembered = remembered.map(|state| KnownForce { pair: state.pair, force: Vector::zeros() });
+        let mut known: Vec<_> = forces.chain(remembered).collect();
+        known.sort_unstable_by_key(|known| known.pair);
+        known
+    }
+
+    /// The candidates of the search and the pairs with known forces, sorted.
+    fn near(
+        &self,
+        step: &BodyStep<'_, D>,
+        mobility: &dyn TwistMobility<D>,
+        known: &[KnownForce<D>],
+    ) -> Result<NearPairs<D>, ContactError> {
+        let found = self.neighbours.candidates.iter().map(|candidate| self.neighbours.key(candidate));
+        let mut pairs: Vec<PairKey> = found.chain(known.iter().map(|known| known.pair)).collect();
+        pairs.sort_unstable();
+        pairs.dedup();
+        let mut near = NearPairs::default();
+        for pair in pairs {
+            let mut touch = self.touch(pair, step)?;
+            touch.compliance = mobility.of_pair(pair);
+            if let Some(rule) = &self.rule {
+                let PairState { gamma, lambda, .. } = self.memory.get(pair);
+                touch.least = rule.floor(gamma, lambda) * self.unit();
+            }
+            let place = known.binary_search_by_key(&pair, |known| known.pair);
+            near.forces.push(place.map_or(Vector::zeros(), |k| known[k].force));
+            near.takes_part.push(place.is_ok() && touch.can_yield());
+            near.touches.push(touch);
+        }
+        Ok(near)
+    }
+
+    /// Takes over what was found.
+    fn take_over(
+        &mut self,
+        step: &BodyStep<'_, D>,
+        near: &NearPairs<D>,
+        outcome: &Outcome<D>,
+    ) -> FlowContactReport {
+        let Outcome { iterations, residual, .. } = *outcome;
+        let contact = ContactReport { iterations, residual, passes: 1, ..ContactReport::default() };
+        let mut report = FlowContactReport { contact, change: 0.0 };
+        let (mut change, mut size, mut forces) = (0.0, 0.0, Vec::new());
+        let friction = self.params.friction;
+        for (touch, force) in near.parts() {
+            let gap = touch.gap_after(step, &outcome.twists);
+            report.contact.count_pair(gap, touch.normal.dot(force), || touch.pair);
+            let before = self.forces.binary_search_by_key(&touch.pair, |before| before.pair);
+            let before = before.map_or(Vector::zeros(), |k| self.forces[k].force);
+            change += touch.power(&(force - before));
+            size += touch.power(force).max(touch.power(&before));
+            let (most, held) =
+                (friction.most(touch.normal.dot(force), self.rate), touch.across(force).norm());
+            report.contact.sliding_count += usize::from(force.amax() > 0.0 && held >= (1.0 - AT_EDGE) * most);
+            if force.amax() > 0.0 {
+                let slip = touch.across(&touch.velocity(&outcome.twists));
+                let (pair, normal, branch) = (touch.pair, touch.normal, touch.branch());
+                forces.push(ContactForce { pair, normal, force: *force, branch, slip, gap });
+            }
+        }
+        report.change = if change > 0.0 { (change / size).sqrt() } else { 0.0 };
+        self.forces = forces;
+        report
+    }
+}
+
+impl<const D: usize> FlowForces<D> for FlowContact<D> {
+    fn set_surroundings(&mut self, tilt: f64, tilt_step: f64, shear_factor: f64) {
+        self.domain.set_sliding(tilt, tilt_step);
+        self.shear_factor = shear_factor;
+    }
+
+    fn set_rate(&mut self, rate: f64) {
+        self.rate = rate;
+    }
+
+    fn begin(&mut self, step: &BodyStep<'_, D>) -> Result<(), ContactError> {
+        self.free = None;
+        self.acceleration.restart();
+        let turned = self.forces.iter().map(|force| {
+            let touch = self.touch(force.pair, step)?;
+            let (pressing, tangential) = (force.pressing(), force.tangential());
+            let across = touch.across(&tangential);
+            let scale = if across.norm() > 0.0 { tangential.norm() / across.norm() } else { 0.0 };
+            Ok(ContactForce {
+                normal: touch.normal,
+                force: touch.normal * pressing + across * scale,
+                branch: touch.branch(),
+                ..*force
+            })
+        });
+        self.forces = turned.collect::<Result<_, ContactError>>()?;
+        Ok(())
+    }
+
+    fn forces(&self) -> &[ContactForce<D>] {
+        &self.forces
+    }
+
+    fn stresses(&self) -> [Matrix<D>; 2] {
+        let volume: f64 = self.domain.lattice.periods().iter().flatten().product();
+        let moment = |one: &ContactForce<D>, force: Vector<D>| {
+            let product = one.branch * force.transpose();
+            (product + product.transpose()) * (-0.5 / volume)
+        };
+        let normal = self.forces.iter().map(|one| moment(one, one.normal * one.pressing()));
+        let tangential = self.forces.iter().map(|one| moment(one, one.tangential()));
+        [normal.sum(), tangential.sum()]
+    }
+
+    fn loads(&self, step: &BodyStep<'_, D>) -> Result<Vec<Wrench<D>>, ContactError> {
+        let mut loads = vec![Wrench::default(); step.poses.len()];
+        for force in &self.forces {
+            self.touch(force.pair, step)?.add_to(&force.force, &mut loads);
+        }
+        Ok(loads)
+    }
+
+    fn correct(
+        &mut self,
+        step: &BodyStep<'_, D>,
+        mobility: &mut dyn TwistMobility<D>,
+        twists: &mut [Twist<D>],
+    ) -> Result<FlowContactReport, ContactError> {
+        let mut free = vec![Twist::default(); step.poses.len()];
+        mobility.respond(&self.loads(step)?, &mut free);
+        free.iter_mut().zip(&*twists).for_each(|(free, flow)| *free = *flow - *free);
+        self.accelerate(step, &mut free);
+        let mut centers = std::mem::take(&mut self.centers);
+        let found = self.solve(step, &centers.of(step), mobility, &free);
+        self.centers = centers;
+        let (near, outcome) = found?;
+        twists.copy_from_slice(&outcome.twists);
+        self.free = Some(free);
+        Ok(self.take_over(step, &near, &outcome))
+    }
+
+    fn finish(&mut self) {
+        let unit = self.unit();
+        let gamma = |pair: PairKey, lambda: f64| {
+            let PairState { gamma, lambda: last, .. } = self.memory.get(pair);
+            self.rule.map_or(0.0, |rule| rule.update(gamma, last, lambda))
+        };
+        let contact = |force: &ContactForce<D>| {
+            let lambda = force.pressing() / unit;
+            Contact { pair: force.pair, lambda, gamma: gamma(force.pair, lambda), gap: force.gap }
+        };
+        self.contacts = self.forces.iter().map(contact).collect();
+        if self.rule.is_some() {
+            let state = |one: &Contact| PairState { pair: one.pair, gamma: one.gamma, lambda: one.lambda };
+            self.memory.pairs = self.contacts.iter().map(state).collect();
+        }
+        self.contacts.retain(|contact| contact.gamma < 0.0 || contact.lambda != 0.0);
+    }
+}
+
+impl<const D: usize> ContactModel<D> for FlowContact<D> {
+    /// In the metric of the drag that each particle has alone: the forces act in no flow.
+    fn correct_bodies(
+        &mut self,
+        step: &BodyStep<'_, D>,
+        twists: &mut [Twist<D>],
+    ) -> Result<ContactReport, ContactError> {
+        let before = std::mem::take(&mut self.forces);
+        let mut drag = LoneDrag { viscosity: self.params.viscosity, radii: step.radii, is_held: &[] };
+        self.free = None;
+        match self.correct(step, &mut drag, twists) {
+            Ok(report) => {
+                self.finish();
+                Ok(report.contact)
+            }
+            Err(error) => {
+                self.forces = before;
+                Err(error)
+            }
+        }
+    }
+
+    fn contacts(&self) -> &[Contact] {
+        &self.contacts
+    }
+
+    fn checkpoint(&self) -> ContactState {
+        let numbers = |vector: &Vector<D>| std::array::from_fn(|d| vector.get(d).copied().unwrap_or(0.0));
+        let state = |one: &ContactForce<D>| {
+            let (normal, force) = (numbers(&one.normal), numbers(&one.force));
+            ForceState { pair: one.pair, normal, force }
+        };
+        ContactState { in_flow: self.forces.iter().map(state).collect(), ..self.memory.clone() }
+    }
+
+    fn resume(&mut self, state: ContactState) -> Result<(), MemoryError> {
+        let mut state = state.checked()?;
+        let vector = |numbers: &[f64; 3]| Vector::<D>::from_fn(|d, _| numbers[d]);
+        let force = |state: ForceState| ContactForce {
+            pair: state.pair,
+            normal: vector(&state.normal),
+            force: vector(&state.force),
+            branch: Vector::zeros(),
+            slip: Vector::zeros(),
+            gap: 0.0,
+        };
+        self.forces = std::mem::take(&mut state.in_flow).into_iter().map(force).collect();
+        self.memory = state;
+        self.contacts.clear();
+        Ok(())
+    }
+
+    /// What pushed rough surfaces would pull them; smooth ones may pull.
+    fn reverse(&mut self) {
+        self.memory.reverse();
+        match self.params.law {
+            NormalLaw::Rough { .. } => self.forces.clear(),
+            NormalLaw::Smooth(_) => self.forces.iter_mut().for_each(|force| force.force = -force.force),
+        }
+    }
+
+    fn set_sliding(&mut self, tilt: f64, tilt_step: f64) {
+        self.domain.set_sliding(tilt, tilt_step);
+    }
+
+    fn in_flow(&mut self) -> Option<&mut dyn FlowForces<D>> {
+        Some(self)
+    }
+}
+
+#[cfg(test)]
+mod tests;

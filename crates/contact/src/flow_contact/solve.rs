@@ -1,0 +1,157 @@
+//! Coulomb's problem of a step, by an accelerated fixed point.
+//!
+//! Forces `F` change motions by `u = u_0 + M B^T F`. Each pair answers to what these do with the force that
+//! its own compliance asks for, within Coulomb's cone,
+//!
+//! `F_n <- max(0, F_n - (g - g_0) / (c d_n))`, `F_t <- P(F_t - v_t / d_t)`, `|P| <= mu max(0, F_n - F_c)`,
+//!
+//! with the gap `g` at the end of the step, the smallest gap `g_0` and the slip `v_t`. A fixed point is a
+//! solution, exact in the gaps. In a mobility with films between the pairs `d` is close to the inverse of `B
+//! M B^T`, so that steps are few; [`Anderson`]'s acceleration makes them fewer.
+
+use gluey_geom::{Twist, Vector, Wrench};
+
+use super::anderson::Anderson;
+use super::params::FlowContactParams;
+use super::touch::Touch;
+use crate::solver::ResidualHistory;
+use crate::{BodyStep, TwistMobility};
+
+/// Steps that the acceleration remembers.
+const WINDOW: usize = 10;
+/// Gaps are known to so many times the rounding of positions.
+const NOISE: f64 = 16.0;
+/// The acceleration begins anew where a residual is so many times the smallest so far.
+const GROWTH: f64 = 10.0;
+
+/// Forces between pairs that may touch, in a step from motions without them.
+pub(super) struct Coulomb<'a, const D: usize> {
+    pub step: &'a BodyStep<'a, D>,
+    pub touches: &'a [Touch<D>],
+    pub params: &'a FlowContactParams,
+    /// The rate by which forces count, over that of the critical load.
+    pub rate: f64,
+    pub mobility: &'a mut dyn TwistMobility<D>,
+    /// Motions without the forces.
+    pub free: &'a [Twist<D>],
+}
+
+/// Outcome of the iteration.
+pub(super) struct Outcome<const D: usize> {
+    /// Motions with the forces.
+    pub twists: Vec<Twist<D>>,
+    pub iterations: usize,
+    /// The last residual, over the size of the forces.
+    pub residual: f64,
+}
+
+/// An iteration that did not end.
+pub(super) struct Stalled {
+    pub residual: f64,
+    pub iterations: usize,
+    pub history: ResidualHistory,
+    /// The pair with the largest residual.
+    pub worst: usize,
+}
+
+impl<const D: usize> Coulomb<'_, D> {
+    /// The forces on the partners, from a guess.
+    pub fn solve(&mut self, forces: &mut Vec<Vector<D>>) -> Result<Outcome<D>, Stalled> {
+        let mut anderson = Anderson::new(WINDOW);
+        let (mut history, mut least) = (Vec::new(), f64::INFINITY);
+        for iterations in 0usize.. {
+            let twists = self.twists(forces);
+            let asked: Vec<Vector<D>> = self
+                .touches
+                .iter()
+                .zip(&*forces)
+                .map(|(touch, force)| self.asked(touch, force, &twists))
+                .collect();
+            let change = self.weighted(|k| asked[k] - forces[k]);
+            let (change_size, size) = (norm(&change), norm(&self.weighted(|k| forces[k])));
+            let residual = if change_size > 0.0 { change_size / size.max(f64::MIN_POSITIVE) } else { 0.0 };
+            if iterations == 0 || iterations.is_power_of_two() {
+                history.push((iterations, residual));
+            }
+            if residual <= self.params.tolerance || change_size <= self.noise() {
+                return Ok(Outcome { twists, iterations, residual });
+            }
+            if iterations == self.params.iteration_limit || residual.is_nan() {
+                let of_pair = |k: usize| (asked[k] - forces[k]).norm();
+                let worst = (0..forces.len()).max_by(|&a, &b| of_pair(a).total_cmp(&of_pair(b))).unwrap_or(0);
+                let history = ResidualHistory { entries: history };
+                return Err(Stalled { residual, iterations, history, worst });
+            }
+            if change_size > GROWTH * least {
+                anderson.restart();
+                least = change_size;
+            }
+            least = least.min(change_size);
+            let next = anderson.next(flat(&asked), change);
+            for (k, (force, next)) in forces.iter_mut().zip(next.chunks_exact(D)).enumerate() {
+                *force = self.admitted(&self.touches[k], &Vector::from_column_slice(next));
+            }
+        }
+        unreachable!("the loop ends by itself")
+    }
+
+    /// The size of changes that positions do not resolve.
+    fn noise(&self) -> f64 {
+        let resolved = resolution(self.step) / self.step.velocity_weight;
+        let squares = self.touches.iter().map(|touch| resolved * resolved / touch.compliance[0]);
+        squares.sum::<f64>().sqrt()
+    }
+
+    /// The motions with these forces.
+    fn twists(&mut self, forces: &[Vector<D>]) -> Vec<Twist<D>> {
+        let mut loads = vec![Wrench::default(); self.free.len()];
+        self.touches.iter().zip(forces).for_each(|(touch, force)| touch.add_to(force, &mut loads));
+        let mut twists = vec![Twist::default(); loads.len()];
+        self.mobility.respond(&loads, &mut twists);
+        twists.iter_mut().zip(self.free).for_each(|(twist, free)| *twist = *twist + *free);
+        twists
+    }
+
+    /// The force that a pair asks for where motions with `force` are these.
+    fn asked(&self, touch: &Touch<D>, force: &Vector<D>, twists: &[Twist<D>]) -> Vector<D> {
+        let [along, across] = touch.compliance;
+        let excess = (touch.gap_after(self.step, twists) - touch.floor) / self.step.velocity_weight;
+        let slip = touch.across(&touch.velocity(twists));
+        self.admitted(touch, &(force - touch.normal * (excess / along) - slip / across))
+    }
+
+    /// The nearest force within the cone, its normal part first.
+    fn admitted(&self, touch: &Touch<D>, force: &Vector<D>) -> Vector<D> {
+        let pressing = touch.normal.dot(force).max(touch.least);
+        let tangential = touch.across(force);
+        let most = self.params.friction.most(pressing, self.rate);
+        let size = tangential.norm();
+        let share = if size > most { most / size } else { 1.0 };
+        touch.normal * pressing + tangential * share
+    }
+
+    /// Vectors of pairs as numbers whose squares are powers.
+    fn weighted(&self, of: impl Fn(usize) -> Vector<D>) -> Vec<f64> {
+        let weigh = |(k, touch): (usize, &Touch<D>)| {
+            let [along, across] = touch.compliance.map(f64::sqrt);
+            let vector = of(k);
+            touch.normal * (touch.normal.dot(&vector) * along) + touch.across(&vector) * across
+        };
+        let all: Vec<Vector<D>> = self.touches.iter().enumerate().map(weigh).collect();
+        flat(&all)
+    }
+}
+
+/// How well positions tell gaps.
+pub(super) fn resolution<const D: usize>(step: &BodyStep<'_, D>) -> f64 {
+    let extent = step.poses.iter().map(|pose| pose.position.amax()).fold(0.0, f64::max);
+    NOISE * f64::EPSILON * extent
+}
+
+fn flat<const D: usize>(vectors: &[Vector<D>]) -> Vec<f64> {
+    vectors.iter().flatten().copied().collect()
+}
+
+fn norm(x: &[f64]) -> f64 {
+    x.iter().map(|x| x * x).sum::<f64>().sqrt()
+}
