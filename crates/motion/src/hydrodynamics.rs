@@ -2,7 +2,7 @@
 
 use gluey_geom::{Matrix, Particle, Twist, Vector, Wrench};
 
-use gluey_contact::Film;
+use gluey_contact::{Film, TwistMobility};
 
 /// A state that velocities are predicted from.
 ///
@@ -34,6 +34,22 @@ pub struct Configuration<'a, const D: usize> {
     /// Stress of the forces between particles that are among these: minus the mean product of forces and
     /// lines between centres.
     pub pair_stress: Matrix<D>,
+    /// Forces of contacts between particles, and of particles with walls, beside all others: they grow with
+    /// the flow, as forces at a given rate do.
+    pub contacts: Option<&'a ContactLoads<D>>,
+}
+
+/// Loads by contacts.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ContactLoads<const D: usize> {
+    /// Forces and torques on the particles.
+    pub wrenches: Vec<Wrench<D>>,
+    /// Minus the mean product of the forces and the lines between centres, its symmetric part.
+    pub stress: Matrix<D>,
+    /// The share of tangential forces in that.
+    pub stress_of_friction: Matrix<D>,
+    /// How many times less accurate than wanted the flow may be, for loads that are not the last ones.
+    pub looseness: f64,
 }
 
 impl<'a, const D: usize> Configuration<'a, D> {
@@ -47,6 +63,7 @@ impl<'a, const D: usize> Configuration<'a, D> {
             with_stress: false,
             wrenches: &[],
             pair_stress: Matrix::zeros(),
+            contacts: None,
         }
     }
 }
@@ -74,6 +91,9 @@ impl<const D: usize> Prediction<D> {
     }
 }
 
+/// Tells the loads of contacts for another prediction, if there is to be one.
+pub type NextLoads<'a, const D: usize> = dyn FnMut(&Prediction<D>) -> Option<ContactLoads<D>> + 'a;
+
 /// Predicts the velocities of particles from their positions, without contact.
 pub trait Hydrodynamics<const D: usize> {
     /// Why a prediction failed.
@@ -81,6 +101,20 @@ pub trait Hydrodynamics<const D: usize> {
 
     /// The velocities of a configuration, and what else the model knows of it.
     fn predict(&mut self, configuration: &Configuration<'_, D>) -> Result<Prediction<D>, Self::Error>;
+
+    /// The same with contacts: after each prediction `next` tells the loads of contacts for another one,
+    /// until it tells none. The last prediction is that of the step.
+    fn predict_with_contacts(
+        &mut self,
+        configuration: &Configuration<'_, D>,
+        next: &mut NextLoads<'_, D>,
+    ) -> Result<Prediction<D>, Self::Error> {
+        let mut prediction = self.predict(configuration)?;
+        while let Some(loads) = next(&prediction) {
+            prediction = self.predict(&Configuration { contacts: Some(&loads), ..*configuration })?;
+        }
+        Ok(prediction)
+    }
 
     /// Whether the model answers to [`Configuration::wrenches`]: a time loop that has some refuses with
     /// [`NoForces`] one that does not.
@@ -92,6 +126,14 @@ pub trait Hydrodynamics<const D: usize> {
     /// particles. None where the model lets gaps close.
     fn films(&self, _configuration: &Configuration<'_, D>, _reach: f64) -> Vec<Film<D>> {
         Vec::new()
+    }
+
+    /// A mobility near that of the flow in which contact forces are sought, `None` where the model has none.
+    fn near_mobility(
+        &self,
+        _configuration: &Configuration<'_, D>,
+    ) -> Result<Option<Box<dyn TwistMobility<D>>>, Self::Error> {
+        Ok(None)
     }
 
     /// The flow fields of the last prediction, for output; `None` where the model has none.
@@ -207,8 +249,11 @@ pub struct MeanStress<const D: usize> {
     /// The share of films that are too thin for the mesh.
     pub of_films: Matrix<D>,
     /// Minus the mean product of the forces of contacts with the lines between the centres that they push
-    /// apart. In 3D only: forces of contacts between discs have no unit of force.
+    /// apart. Not in 2D in the metric of Stokes drag: forces of contacts between discs have no unit of force
+    /// there.
     pub of_contacts: Option<Matrix<D>>,
+    /// The share of friction in that, of contacts whose forces act in the flow.
+    pub of_friction: Option<Matrix<D>>,
     /// The same of forces by which particles repel each other.
     pub of_repulsion: Matrix<D>,
     /// Power dissipated by fluid and films.
@@ -216,6 +261,9 @@ pub struct MeanStress<const D: usize> {
     /// Power of the forces and torques that act on the particles from outside, such as their weight, on
     /// motions beside the undisturbed ones: what is dissipated without the shear having done it.
     pub work_of_forces: f64,
+    /// Power of the forces of contacts that act in the flow on the motions of surfaces against each other:
+    /// minus what friction dissipates.
+    pub work_of_contacts: f64,
 }
 
 impl<const D: usize> MeanStress<D> {
@@ -234,6 +282,11 @@ impl<const D: usize> MeanStress<D> {
         self.of_contacts.map(|stress| self.over_rate(stress[(0, 1)]))
     }
 
+    /// The share of friction in the relative viscosity.
+    pub fn viscosity_of_friction(&self) -> Option<f64> {
+        self.of_friction.map(|stress| self.over_rate(stress[(0, 1)]))
+    }
+
     /// The share of repulsion in the relative viscosity.
     pub fn viscosity_of_repulsion(&self) -> f64 {
         self.over_rate(self.of_repulsion[(0, 1)])
@@ -244,14 +297,14 @@ impl<const D: usize> MeanStress<D> {
         self.over_rate(self.of_films[(0, 1)])
     }
 
-    /// The relative viscosity from the power of the shear: that which is dissipated, less that of forces from
-    /// outside, as `<sigma>:E = Phi / V - sum (F.U' + T.Omega') / V` with motions beside the undisturbed ones
-    /// and no mean velocity.
+    /// The relative viscosity from the power of the shear: that which fluid and films dissipate, less that of
+    /// forces from outside, as `<sigma>:E = Phi / V - sum (F.U' + T.Omega') / V` with motions beside the
+    /// undisturbed ones and no mean velocity, and what friction dissipates.
     ///
     /// `None` where these forces do more than the shear, which is then a small difference of numbers that are
     /// known to the error of the mesh.
     pub fn viscosity_by_dissipation(&self) -> Option<f64> {
-        let of_shear = self.dissipation - self.work_of_forces;
+        let of_shear = self.dissipation - self.work_of_forces - self.work_of_contacts;
         let has_meaning = self.work_of_forces.abs() <= of_shear;
         has_meaning.then(|| of_shear / (self.viscosity * self.rate * self.rate))
     }

@@ -33,11 +33,11 @@ mod mobility_table;
 mod pair_mobility;
 
 pub use approach::approach_mobility;
-/// Names of what [`Hydrodynamics::films`] returns.
-pub use gluey_contact::{Film, PairKey};
+/// Names of what [`Hydrodynamics::films`] and [`Hydrodynamics::near_mobility`] return.
+pub use gluey_contact::{Film, LoneDrag, PairKey, TwistMobility};
 pub use hydrodynamics::{
-    Configuration, Fields, FlowStatistics, Holding, Hydrodynamics, MeanStress, NoForces, Prediction,
-    ResumeError,
+    Configuration, ContactLoads, Fields, FlowStatistics, Holding, Hydrodynamics, MeanStress, NextLoads,
+    NoForces, Prediction, ResumeError,
 };
 pub use integrator::{Integrator, Scheme};
 pub use linear_flow::{BackgroundFlow, LinearFlow};

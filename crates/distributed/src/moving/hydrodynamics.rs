@@ -2,8 +2,11 @@
 
 use std::rc::Rc;
 
+use gluey_contact::TwistMobility;
 use gluey_levelset::Ball;
-use gluey_motion::{Configuration, Fields, Film, FlowStatistics, Hydrodynamics, Prediction, ResumeError};
+use gluey_motion::{
+    Configuration, Fields, Film, FlowStatistics, Hydrodynamics, NextLoads, Prediction, ResumeError,
+};
 use gluey_parallel::Ranks;
 
 use super::suspension::{SharedSuspension, SuspensionError};
@@ -44,16 +47,32 @@ impl<const D: usize> Hydrodynamics<D> for SharedHydrodynamics<'_, D> {
     type Error = SuspensionError;
 
     fn predict(&mut self, configuration: &Configuration<'_, D>) -> Result<Prediction<D>, SuspensionError> {
+        self.predict_with_contacts(configuration, &mut |_| None)
+    }
+
+    fn predict_with_contacts(
+        &mut self,
+        configuration: &Configuration<'_, D>,
+        next: &mut NextLoads<'_, D>,
+    ) -> Result<Prediction<D>, SuspensionError> {
         // Its memory is free for the next.
         self.last = None;
         let start = std::time::Instant::now();
-        let (flow, prediction) = self.suspension.solve_from(self.ranks, configuration, &self.memory)?;
+        let (flow, prediction) = self.suspension.solve_from(self.ranks, configuration, &self.memory, next)?;
         let phases = vec![("shared flow", start.elapsed().as_secs_f64())];
         let statistics = FlowStatistics { phases, ..flow.flow.statistics(flow.raised_penalties) };
         let (balls, shear_factor) =
             (self.suspension.suspension.balls(configuration), configuration.shear_factor);
         self.last = Some(PredictedFlow { flow, balls, shear_factor });
         Ok(Prediction { statistics, ..prediction })
+    }
+
+    fn near_mobility(
+        &self,
+        configuration: &Configuration<'_, D>,
+    ) -> Result<Option<Box<dyn TwistMobility<D>>>, SuspensionError> {
+        let SharedSuspension { flow, suspension } = self.suspension;
+        Ok(Some(Box::new(suspension.near_mobility(configuration, flow.viscosity)?)))
     }
 
     fn answers_to_forces(&self) -> bool {

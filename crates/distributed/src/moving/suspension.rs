@@ -3,7 +3,7 @@
 use gluey_fem::{ImplicitTree, MeshError};
 use gluey_geom::Vector;
 use gluey_levelset::BallTree;
-use gluey_motion::{Configuration, Prediction};
+use gluey_motion::{Configuration, NextLoads, Prediction};
 use gluey_parallel::{Communicator, Ranks};
 use gluey_stokes::{NotDriven, StokesError, Suspension};
 
@@ -46,7 +46,7 @@ impl<const D: usize> SharedSuspension<D> {
         ranks: &Ranks,
         configuration: &Configuration<'_, D>,
     ) -> Result<LocalFlow<D>, SuspensionError> {
-        Ok(self.solve_from(ranks, configuration, &FlowMemory::default())?.0)
+        Ok(self.solve_from(ranks, configuration, &FlowMemory::default(), &mut |_| None)?.0)
     }
 
     /// The flow of a configuration, and what it predicts but for statistics. The first solve starts from the
@@ -56,8 +56,9 @@ impl<const D: usize> SharedSuspension<D> {
         ranks: &Ranks,
         configuration: &Configuration<'_, D>,
         memory: &FlowMemory<D>,
+        next: &mut NextLoads<'_, D>,
     ) -> Result<(LocalFlow<D>, Prediction<D>), SuspensionError> {
-        let Self { flow: BoxFlow { viscosity, .. }, suspension } = self;
+        let suspension = &self.suspension;
         let balls = suspension.balls(configuration);
         let shear = balls.first().map_or(0.0, |ball| ball.lattice().shear());
         let (refinement, tree_of_balls) = (&suspension.refinement, BallTree::new(&balls));
@@ -78,14 +79,11 @@ impl<const D: usize> SharedSuspension<D> {
         let bodies = SurfaceBodies { balls: &balls, lubrication: suspension.lubrication };
         let mut kept = memory.last.take();
         let mut leaves = SharedTree { tree: &mut whole, cuts: &cuts, ranks };
-        let (flow, rate) = suspension.driven(configuration, *viscosity, |drive| {
-            self.flow.solve_from(&bodies, &mut leaves, &mut kept, |solver, mesh| {
-                solver.solve_driven::<SuspensionError>(mesh, &balls, drive)
-            })
+        let found = self.flow.solve_from(&bodies, &mut leaves, &mut kept, |solver, mesh| {
+            solver.predict::<SuspensionError>(mesh, suspension, configuration, next)
         })?;
         memory.last.replace(kept);
-        let prediction = suspension.prediction(configuration, *viscosity, &flow.flow, rate);
-        Ok((flow, prediction))
+        Ok(found)
     }
 }
 

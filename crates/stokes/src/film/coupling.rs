@@ -101,7 +101,11 @@ impl<const D: usize> FilmCoupling<D> {
             let mut flow = flow.iter();
             for mode in &modes {
                 let scale = (viscosity * mode.lacks).sqrt();
-                let row = mode.row(space, film, if mode.is_flow { flow.next() } else { None });
+                let through = if mode.is_flow { flow.next() } else { None };
+                let mut row = mode.row(space.full_dim(), film, through);
+                for (node, weight) in through.iter().flat_map(|flow| &flow.nodes) {
+                    space.push_load(*node as usize, weight, &mut row);
+                }
                 rows.push(row.into_iter().map(|(k, weight)| (k, scale * weight)));
                 inverses.push(mode.has / (mode.has + mode.lacks));
                 scales.push(scale);
@@ -304,6 +308,32 @@ fn key<const D: usize>(film: &Film<D>) -> [f64; 2] {
     [f64::from(film.body), partner]
 }
 
+/// The rows of the motions that a film between two bodies resists, as of one that nothing else resolves up to
+/// the thickness `height`, in the motions of all bodies: numbered from `first` on.
+pub fn rows_of_film<const D: usize>(
+    film: &Film<D>,
+    height: f64,
+    viscosity: f64,
+    first: usize,
+) -> Vec<FilmRow> {
+    let lacks = film.shape(height).deficits::<D>();
+    let modes = modes::<D>(film, &[], &lacks, &lacks);
+    let resisting = modes.iter().filter(|mode| mode.lacks > 0.0);
+    let scaled = |(k, mode): (usize, &Mode<D>)| {
+        let scale = (viscosity * mode.lacks).sqrt();
+        let entries: Vec<_> = mode.row(0, film, None).into_iter().map(|(k, w)| (k, scale * w)).collect();
+        FilmRow::new(first + k, Dim::<D>::RIGID, &entries)
+    };
+    resisting.enumerate().map(scaled).collect()
+}
+
+/// The row of the velocity of the body beyond that of its partner in the middle of a film, in this direction.
+pub fn row_of_velocity<const D: usize>(film: &Film<D>, direction: Vector<D>) -> FilmRow {
+    let mode =
+        Mode { direction, slip: 1.0, approach: 0.0, turning: 0.0, is_flow: false, has: 0.0, lacks: 0.0 };
+    FilmRow::new(0, Dim::<D>::RIGID, &mode.row(0, film, None))
+}
+
 /// A mode of the relative motion of the two sides of a film: `slip v.t + approach v.n + turning
 /// ((w_1 - w_2) x n).t` in a direction `t`, and the flow through the film if it is one of that.
 #[derive(Clone, Copy, Debug)]
@@ -374,13 +404,13 @@ fn modes<const D: usize>(
 }
 
 impl<const D: usize> Mode<D> {
-    /// Its row in reduced velocities: those of the sides, then those of the nodes in the film.
-    fn row(&self, space: &VelocitySpace<D>, film: &Film<D>, flow: Option<&FilmFlow<D>>) -> Vec<(u32, f64)> {
+    /// Its row in the motions of the two sides, where those of all bodies begin at `first`.
+    fn row(&self, first: usize, film: &Film<D>, flow: Option<&FilmFlow<D>>) -> Vec<(u32, f64)> {
         let (t, n) = (&self.direction, &film.normal);
         let mut row = Vec::with_capacity(2 * Dim::<D>::RIGID);
         for (side, sign) in [1.0, -1.0].into_iter().enumerate() {
             let Some(body) = film.side(side) else { continue };
-            let first = space.full_dim() + body * Dim::<D>::RIGID;
+            let first = first + body * Dim::<D>::RIGID;
             // From the centre to the middle of the film.
             let arm = n * (sign * film.arm(side));
             let turn = Dim::<D>::moment(&arm, t) * self.slip + Dim::<D>::moment(n, t) * self.turning;
@@ -392,9 +422,6 @@ impl<const D: usize> Mode<D> {
             let spins = Dim::<D>::spin_slice(&turn).iter().map(|w| w / film.radii[side]);
             let entries = force.iter().copied().chain(spins).enumerate();
             row.extend(entries.map(|(k, weight)| ((first + k) as u32, weight)));
-        }
-        if let Some(flow) = flow {
-            flow.nodes.iter().for_each(|(node, weight)| space.push_load(*node as usize, weight, &mut row));
         }
         row
     }

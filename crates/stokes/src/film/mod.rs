@@ -11,12 +11,14 @@
 mod coupling;
 mod deficit;
 mod flux;
+mod mobility;
 mod near;
 mod network;
 
 pub use coupling::{FilmCoupling, FilmForce};
 pub use deficit::FilmShape;
 pub use flux::FilmFlow;
+pub use mobility::NearMobility;
 pub use near::{Film, Heights, Partner, films, thin_films};
 pub use network::{FilmCorrection, FilmNetwork, FilmRow, SharedTwists};
 

@@ -76,7 +76,7 @@ impl FilmRow {
     }
 
     /// Positions of its entries among the twists, `rigid` numbers for each body, with their weights.
-    fn entries(&self, rigid: usize) -> impl Iterator<Item = (usize, f64)> + '_ {
+    pub(super) fn entries(&self, rigid: usize) -> impl Iterator<Item = (usize, f64)> + '_ {
         let sides = self.bodies.iter().zip(&self.weights).filter(|(body, _)| **body != NO_BODY);
         sides.flat_map(move |(&body, weights)| {
             weights[..rigid].iter().enumerate().map(move |(k, &weight)| (body as usize * rigid + k, weight))
@@ -178,6 +178,17 @@ impl FilmNetwork {
             twists: vec![0.0; dim],
             all: vec![0.0; if self.shared.is_some() { dim } else { 0 }],
         })
+    }
+
+    /// The motions of all bodies under a load, `K^-1` of it: zero for those that are held.
+    ///
+    /// # Errors
+    /// [`DirectError::OutOfMemory`].
+    pub fn respond(&self, load: &mut [f64]) -> Result<Vec<f64>, DirectError> {
+        self.clear_held(load);
+        let mut motions = vec![0.0; load.len()];
+        self.factor.substitution()?.apply(load, &mut motions);
+        Ok(motions)
     }
 
     fn clear_held(&self, load: &mut [f64]) {

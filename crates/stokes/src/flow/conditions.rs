@@ -1,5 +1,7 @@
 //! What drives a flow: boundary, forces, and of the bodies either wrenches or twists.
 
+use std::borrow::Cow;
+
 use gluey_geom::{Matrix, Twist, Vector, Wrench};
 
 use crate::error::StokesError;
@@ -110,6 +112,14 @@ impl<'a, const D: usize> Conditions<'a, D> {
         Self { force, ..self }
     }
 
+    /// The wrenches on bodies that are all free; no entries where none act, or where any is held.
+    pub(super) fn given_wrenches(&self) -> &'a [Wrench<D>] {
+        match self.bodies {
+            Given::Wrenches(wrenches) => wrenches,
+            Given::Twists(_) | Given::Each(_) => &[],
+        }
+    }
+
     /// The same with the stress of the suspension.
     #[must_use]
     pub fn with_stress(self) -> Self {
@@ -212,5 +222,14 @@ impl<'a, const D: usize> Conditions<'a, D> {
         problem.add_wrenches(&self.wrenches_on_free(), &mut b)?;
         problem.system.space.clear_held(&mut b);
         Ok((lift, b))
+    }
+}
+
+/// The sums of wrenches of particles; no entries for none on any.
+pub fn added<'a, const D: usize>(these: &'a [Wrench<D>], those: &'a [Wrench<D>]) -> Cow<'a, [Wrench<D>]> {
+    match (these, those) {
+        (these, []) => these.into(),
+        ([], those) => those.into(),
+        _ => these.iter().zip(those).map(|(this, that)| *this + *that).collect(),
     }
 }

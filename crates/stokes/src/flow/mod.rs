@@ -2,13 +2,13 @@
 
 mod adaptive_penalty;
 mod balance;
-mod combined;
 mod conditions;
 mod fields;
 mod mean;
 mod prepared;
 mod raised;
 mod refinement;
+mod step;
 mod stress;
 mod times;
 mod warm_start;
@@ -27,13 +27,14 @@ use crate::formulation::{FlowData, Formulation, Method, Problem, check_viscosity
 use crate::solver::{SaddleSolver, SolveReport, SolverKind};
 use crate::space::{Discretisation, solid_nodes};
 use stress::stress_of;
-use times::Watch;
 use warm_start::WarmStart;
 
+pub(crate) use conditions::added;
 pub use conditions::{Conditions, Field, Given, GivenOf};
 pub use prepared::Prepared;
 pub use raised::RaisedPenalties;
 pub use refinement::Refinement;
+pub(crate) use step::FlowsOfStep;
 pub use stress::Stress;
 pub use times::PhaseTimes;
 pub use warm_start::{NodalFields, WarmStartError};
@@ -109,6 +110,15 @@ pub struct Flow<const D: usize> {
 }
 
 impl<const D: usize> Flow<D> {
+    /// Counts the effort of an earlier flow of the same step as well.
+    pub(crate) fn count_effort_of(&mut self, earlier: &Self) {
+        self.solve_count += earlier.solve_count;
+        self.iteration_count += earlier.iteration_count;
+        self.fine_operator_applications += earlier.fine_operator_applications;
+        self.solve_traffic = self.solve_traffic + earlier.solve_traffic;
+        self.times = self.times + earlier.times;
+    }
+
     /// The nodal velocities with the motion of the `bodies`, those of the flow, at all nodes inside these:
     /// for pictures. In `unfitted` [`Flow::velocity`] continues the fluid's polynomials there, which give the
     /// velocity of the fluid in the cells that surfaces cut.
@@ -122,16 +132,6 @@ impl<const D: usize> Flow<D> {
         }
         velocity
     }
-}
-
-/// A flow with its problem, for which the solver is prepared.
-struct FirstFlow<const D: usize> {
-    problem: Problem<D>,
-    method: Arc<dyn Method<D>>,
-    flow: Flow<D>,
-    /// The reduced vector it belongs to.
-    x: Vec<f64>,
-    watch: Watch,
 }
 
 /// Computes flows one after the other, keeping what can be reused.
@@ -240,34 +240,7 @@ impl<const D: usize> FlowSolver<D> {
         bodies: &[Ball<D>],
         conditions: &Conditions<'_, D>,
     ) -> Result<Flow<D>, StokesError> {
-        let FirstFlow { mut problem, mut method, mut flow, watch, .. } =
-            self.first_flow(discretisation, bodies, conditions)?;
-        if conditions.without_mean {
-            (flow, _) = self.balanced(&mut problem, &mut method, conditions, flow)?;
-        }
-        flow.times = watch.times();
-        Ok(flow)
-    }
-
-    /// The flow from the last one, which it becomes.
-    fn first_flow(
-        &mut self,
-        discretisation: &Discretisation<D>,
-        bodies: &[Ball<D>],
-        conditions: &Conditions<'_, D>,
-    ) -> Result<FirstFlow<D>, StokesError> {
-        let start = Instant::now();
-        let mut problem = self.problem(discretisation, bodies)?;
-        problem.system.space.hold(&conditions.held(bodies.len()));
-        let assembled = Instant::now();
-        let mut method = self.method.clone();
-        self.prepare(&mut problem, &mut method)?;
-        let watch = Watch { start, assembled, prepared: Instant::now() };
-        let (guess, before) = self.initial_guess(&problem, conditions)?;
-        let adapted = self.solve_with_adaptive_penalty(&mut problem, &mut method, conditions, &guess)?;
-        let (flow, x) = (adapted.flow, adapted.x);
-        self.keep_for_next(&problem, &x, &flow.pressure, before);
-        Ok(FirstFlow { problem, method, flow, x, watch })
+        self.flows_of_step(discretisation, bodies).solve(conditions)
     }
 
     fn problem(
@@ -317,6 +290,11 @@ impl<const D: usize> FlowSolver<D> {
     ) -> Result<Self, StokesError> {
         self.solvers.iter_mut().try_for_each(|solver| solver.share(coarser, max_iterations))?;
         Ok(self)
+    }
+
+    /// Viscosity of the fluid.
+    pub fn viscosity(&self) -> f64 {
+        self.params.viscosity
     }
 
     /// The nodes of a mesh: those of the last one, if it is the same.
@@ -390,6 +368,7 @@ impl<const D: usize> FlowSolver<D> {
     ) {
         if self.params.solver == SolverKind::Multigrid {
             let last = NodalFields::of(&problem.system, x, pressure.to_vec());
+            let before = before.or_else(|| self.warm_start.take().and_then(WarmStart::into_before));
             self.warm_start = Some(WarmStart::new(problem.discretisation().clone(), last, before));
         }
     }

@@ -13,6 +13,18 @@ pub struct PhaseTimes {
     pub solve: f64,
 }
 
+impl std::ops::Add for PhaseTimes {
+    type Output = Self;
+
+    fn add(self, other: Self) -> Self {
+        Self {
+            assembly: self.assembly + other.assembly,
+            preparation: self.preparation + other.preparation,
+            solve: self.solve + other.solve,
+        }
+    }
+}
+
 /// Moments at which phases of a prediction ended.
 #[derive(Clone, Copy)]
 pub struct Watch {

@@ -97,6 +97,11 @@ impl<const D: usize> WarmStart<D> {
         (&self.last, self.before.as_ref())
     }
 
+    /// The one before.
+    pub fn into_before(self) -> Option<NodalFields> {
+        self.before
+    }
+
     /// Both flows on another mesh.
     pub fn moved(&self, to: &Discretisation<D>) -> Self {
         let from = &self.discretisation;

@@ -7,12 +7,11 @@
 //! step only and is no part of what is given.
 
 use gluey_geom::{Vector, Wrench};
-use gluey_levelset::Ball;
-use gluey_motion::Configuration;
+use gluey_motion::{Configuration, NextLoads, Prediction};
 
 use super::Suspension;
 use crate::error::StokesError;
-use crate::flow::{Conditions, Flow, FlowSolver, GivenOf, Stress};
+use crate::flow::{Conditions, Flow, FlowSolver, FlowsOfStep, GivenOf, Stress, added};
 use crate::space::Discretisation;
 
 /// Conditions that drive the flow of a configuration.
@@ -31,8 +30,9 @@ struct StressControl {
     direction: f64,
     viscosity: f64,
     volume: f64,
-    /// Shear stress of the forces between particles themselves.
+    /// Shear stress of the forces between particles themselves, and of contacts at this rate.
     of_pairs: f64,
+    of_contacts: f64,
 }
 
 /// The forces between particles drive them faster than the stress that is given.
@@ -63,7 +63,9 @@ impl<const D: usize> Suspension<D> {
         solve: impl FnOnce(&Drive<'_, D>) -> T,
     ) -> T {
         let (undisturbed, is_sheared) = (self.undisturbed(configuration.shear_factor), self.is_sheared());
-        let acting = self.acting(configuration);
+        let in_contact = configuration.contacts.map_or(&[][..], |contacts| &contacts.wrenches);
+        let without = self.acting(configuration);
+        let acting = added(&without, in_contact);
         let given = self.given_bodies(configuration, &acting);
         let control = self.control(configuration, viscosity);
         let wall = |x: &Vector<D>| undisturbed.velocity(x);
@@ -72,7 +74,7 @@ impl<const D: usize> Suspension<D> {
             false => Conditions::boundary(&wall),
         };
         let conditions = match given[..] {
-            [] if control.is_some() => conditions,
+            [] if control.is_some() => conditions.with_wrenches(in_contact),
             [] => conditions.with_wrenches(&acting),
             _ if is_sheared && self.force_density.is_none() => {
                 conditions.with_bodies(&given).without_mean_flow()
@@ -85,7 +87,7 @@ impl<const D: usize> Suspension<D> {
             if density.norm() > 0.0 { conditions.with_force(Some(&uniform)) } else { conditions };
         let stress = is_sheared && given.is_empty() && (configuration.with_stress || control.is_some());
         let pushes = match control {
-            Some(_) if acting.iter().any(|wrench| wrench.force.amax() > 0.0) => &acting[..],
+            Some(_) if without.iter().any(|wrench| wrench.force.amax() > 0.0) => &without[..],
             _ => &[],
         };
         solve(&Drive { conditions: Conditions { stress, ..conditions }, pushes, control })
@@ -121,6 +123,7 @@ impl<const D: usize> Suspension<D> {
             viscosity,
             volume: self.domain.extent().product(),
             of_pairs: configuration.pair_stress[(0, 1)],
+            of_contacts: configuration.contacts.map_or(0.0, |contacts| contacts.stress[(0, 1)]),
         })
     }
 }
@@ -134,9 +137,9 @@ impl<const D: usize> Drive<'_, D> {
     /// [`NotDriven`] if it is negative.
     pub fn rate(&self, driven: Option<&Stress<D>>, pushed: Option<&Stress<D>>) -> Result<f64, NotDriven> {
         let Some(control) = &self.control else { return Ok(1.0) };
-        let StressControl { stress, direction, viscosity, volume, of_pairs } = *control;
+        let StressControl { stress, direction, viscosity, volume, of_pairs, of_contacts } = *control;
         let of_bodies = |stress: Option<&Stress<D>>| stress.map_or(0.0, |it| it.of_bodies(volume)[(0, 1)]);
-        let at_rate_one = viscosity * direction + of_bodies(driven);
+        let at_rate_one = viscosity * direction + of_bodies(driven) + of_contacts;
         if self.pushes.is_empty() {
             return Ok(direction * stress / at_rate_one);
         }
@@ -150,14 +153,42 @@ impl<const D: usize> Drive<'_, D> {
 }
 
 impl<const D: usize> FlowSolver<D> {
-    /// The flow that this drives, and [`Drive::rate`]. All ranks call this.
+    /// The flow of a configuration on its mesh, or on the part of it that a rank has, and what it predicts;
+    /// after each flow `next` tells the loads of contacts for another one, until it tells none. All ranks
+    /// call this, with the same configuration.
     ///
     /// # Errors
-    /// Those of [`FlowSolver::solve_combined`], and [`NotDriven`].
-    pub fn solve_driven<E: From<StokesError> + From<NotDriven>>(
+    /// Those of [`FlowSolver::solve_on`], and [`NotDriven`].
+    pub fn predict<E: From<StokesError> + From<NotDriven>>(
         &mut self,
         discretisation: &Discretisation<D>,
-        bodies: &[Ball<D>],
+        suspension: &Suspension<D>,
+        configuration: &Configuration<'_, D>,
+        next: &mut NextLoads<'_, D>,
+    ) -> Result<(Flow<D>, Prediction<D>), E> {
+        let (balls, viscosity) = (suspension.balls(configuration), self.viscosity());
+        let mut flows = self.flows_of_step(discretisation, &balls);
+        let mut loads = configuration.contacts.cloned();
+        let mut last = None;
+        loop {
+            let now = Configuration { contacts: loads.as_ref(), ..*configuration };
+            flows.set_looseness(loads.as_ref().map_or(1.0, |loads| loads.looseness));
+            let (mut flow, rate) =
+                suspension.driven(&now, viscosity, |drive| flows.solve_driven::<E>(drive))?;
+            last.iter().for_each(|last| flow.count_effort_of(last));
+            let prediction = suspension.prediction(&now, viscosity, &flow, rate);
+            match next(&prediction) {
+                Some(more) => (loads, last) = (Some(more), Some(flow)),
+                None => return Ok((flow, prediction)),
+            }
+        }
+    }
+}
+
+impl<const D: usize> FlowsOfStep<'_, D> {
+    /// The flow that this drives, and [`Drive::rate`]. All ranks call this.
+    fn solve_driven<E: From<StokesError> + From<NotDriven>>(
+        &mut self,
         drive: &Drive<'_, D>,
     ) -> Result<(Flow<D>, f64), E> {
         let mut found = None;
@@ -166,8 +197,7 @@ impl<const D: usize> FlowSolver<D> {
             found = Some(rate);
             Ok::<_, E>(rate.recip())
         };
-        let flow =
-            self.solve_combined(discretisation, bodies, &drive.conditions, drive.pushes, inverse_rate)?;
+        let flow = self.solve_combined(&drive.conditions, drive.pushes, inverse_rate)?;
         let rate = found.map_or_else(|| drive.rate(flow.stress.as_ref(), None), Ok)?;
         Ok((flow, rate))
     }

@@ -1,6 +1,7 @@
 //! Suspensions in a shear flow: what drives the flow of a configuration, and what it predicts.
 
 mod drive;
+mod mobility;
 mod prediction;
 
 use std::borrow::Cow;
@@ -11,7 +12,7 @@ use gluey_levelset::Ball;
 use gluey_motion::{Configuration, LinearFlow};
 
 use crate::film::Lubrication;
-use crate::flow::Refinement;
+use crate::flow::{Refinement, added};
 
 pub use drive::{Drive, NotDriven};
 
@@ -40,9 +41,8 @@ pub use drive::{Drive, NotDriven};
 /// let now = Configuration::at(0.0, &particles);
 /// let (balls, mut solver) = (suspension.balls(&now), FlowSolver::new(FlowParams::for_dimension(2))?);
 /// let mesh = solver.discretised(suspension.mesh(&balls)?);
-/// let solved = suspension.driven(&now, 1.0, |drive| solver.solve_driven(&mesh, &balls, drive));
-/// let (flow, rate) = solved.map_err(|error: Box<dyn std::error::Error>| error)?;
-/// let prediction = suspension.prediction(&now, 1.0, &flow, rate);
+/// let solved = solver.predict(&mesh, &suspension, &now, &mut |_| None);
+/// let (_, prediction) = solved.map_err(|error: Box<dyn std::error::Error>| error)?;
 /// // Here as of a flow between walls that move.
 /// let walls = |x: &Vector<2>| Vector::<2>::new(2.0 * (x[1] - 0.5), 0.0);
 /// assert_eq!(prediction.twists, solver.solve(suspension.mesh(&balls)?, &balls, &walls)?.twists);
@@ -123,12 +123,8 @@ impl<const D: usize> Suspension<D> {
         self.given.get(particle).copied().flatten().map(|twist| twist * shear_factor)
     }
 
-    /// All forces and torques on the particles; no entries for none on any.
+    /// All forces and torques on the particles but those of contacts; no entries for none on any.
     fn acting<'a>(&'a self, configuration: &Configuration<'a, D>) -> Cow<'a, [Wrench<D>]> {
-        match (&self.wrenches[..], configuration.wrenches) {
-            (always, []) => always.into(),
-            ([], now) => now.into(),
-            (always, now) => always.iter().zip(now).map(|(always, now)| *always + *now).collect(),
-        }
+        added(&self.wrenches, configuration.wrenches)
     }
 }

@@ -1,11 +1,11 @@
 //! What a flow predicts of the particles of a configuration.
 
-use gluey_geom::{Matrix, Twist, Vector};
-use gluey_motion::{Configuration, Fields, Film, Holding, MeanStress, PairKey, Prediction};
+use gluey_geom::{Matrix, Twist, Vector, Wrench};
+use gluey_motion::{Configuration, ContactLoads, Fields, Film, Holding, MeanStress, PairKey, Prediction};
 
 use super::Suspension;
 use crate::film::{self, Lubrication, Partner};
-use crate::flow::Flow;
+use crate::flow::{Flow, added};
 
 impl<const D: usize> Suspension<D> {
     /// What a flow in a fluid of this viscosity predicts, with the rate that its [`super::Drive`] has; the
@@ -46,22 +46,32 @@ impl<const D: usize> Suspension<D> {
     ) -> Option<MeanStress<D>> {
         let stress = flow.stress.as_ref().filter(|_| configuration.with_stress)?;
         let volume = self.domain.extent().product();
-        let powers = self.wrenches.iter().zip(&flow.twists).map(|(wrench, twist)| wrench.power(twist));
+        let power = |wrenches: &[Wrench<D>]| -> f64 {
+            wrenches.iter().zip(&flow.twists).map(|(wrench, twist)| wrench.power(twist)).sum()
+        };
+        let shear = self.shear_rate * configuration.shear_factor;
+        let contacts = configuration.contacts;
+        let of_contact =
+            |loads: &ContactLoads<D>| power(&loads.wrenches) / volume - shear * loads.stress[(0, 1)];
         Some(MeanStress {
-            rate: self.shear_rate * configuration.shear_factor,
+            rate: shear,
             viscosity,
             of_bodies: stress.of_bodies(volume),
             of_films: stress.of_films.iter().sum::<Matrix<D>>() / volume,
-            of_contacts: None,
+            of_contacts: contacts.map(|contacts| contacts.stress),
+            of_friction: contacts.map(|contacts| contacts.stress_of_friction),
             of_repulsion: configuration.pair_stress / rate,
             dissipation: stress.dissipation / volume,
-            work_of_forces: powers.sum::<f64>() / volume,
+            work_of_forces: power(&self.wrenches) / volume,
+            work_of_contacts: contacts.map_or(0.0, of_contact),
         })
     }
 
     /// What holds the particles whose motions are given.
     fn holding(&self, configuration: &Configuration<'_, D>, flow: &Flow<D>) -> Option<Holding<D>> {
-        let acting = self.acting(configuration);
+        let without = self.acting(configuration);
+        let in_contact = configuration.contacts.map_or(&[][..], |contacts| &contacts.wrenches);
+        let acting = added(&without, in_contact);
         let holds = |index: usize| flow.wrenches[index] - acting.get(index).copied().unwrap_or_default();
         let held = (0..self.given.len()).filter(|&index| self.given[index].is_some());
         Some(Holding {
@@ -92,7 +102,7 @@ impl<const D: usize> Suspension<D> {
 
     /// The name of a film. Walls are counted as those of contact: from those across `y` on, through which no
     /// flow goes.
-    fn pair(&self, configuration: &Configuration<'_, D>, film: &film::Film<D>) -> PairKey {
+    pub(super) fn pair(&self, configuration: &Configuration<'_, D>, film: &film::Film<D>) -> PairKey {
         let first = film.body as usize;
         match film.partner {
             Partner::Wall { axis, is_upper } => {
