@@ -13,6 +13,7 @@ mod many;
 #[path = "../support/program.rs"]
 mod program;
 mod repulsion;
+mod rough;
 #[path = "../support/runs.rs"]
 mod runs;
 mod shear_stress;

@@ -410,7 +410,7 @@ fn arguments_that_make_no_sense() {
     let folder = TempDir::new().expect("a folder");
     fs::write(folder.path().join("case.toml"), GOOD).expect("a file");
     for (arguments, expected) in [
-        (["--strategy", "glue"], "expected `none`, `velocity-correction`, `inelastic` or `gluey`"),
+        (["--strategy", "glue"], "`glue` is not a known strategy"),
         (["--formulation", "soft"], "`soft` is not a known formulation"),
         (["--vtk", "0"], "must be at least 1"),
         (["--checkpoint-every", "often"], "must be a whole number"),

@@ -276,8 +276,8 @@ fn written(folder: &Path, found: &mut Vec<(&'static str, String)>) {
     }
 }
 
-/// Runs with every optional table, in 2D and 3D: few and many particles, contact and repulsion, a given
-/// stress, particles that are held, two radii, frames and their analysis, and a study.
+/// Runs with every optional table, in 2D and 3D: few and many particles, contact of two kinds and repulsion, a
+/// given stress, particles that are held, two radii, frames and their analysis, and a study.
 fn all_tables(folder: &Path) {
     let mesh = "[flow.mesh]\ncells_per_radius = 1.0\n";
     for dimension in [2, 3] {
@@ -296,7 +296,9 @@ fn all_tables(folder: &Path) {
         let stress = format!("shear_stress = 1.0\n{none}domain = {{ boundary = \"sheared\" }}\n");
         let one = format!("particles = [{{ position = [{middle}], radius = 0.1 }}]\n");
         write(folder, "stress.toml", &format!("name = \"stress{dimension}\"\n{head}{stress}{one}{mesh}"));
-        for case in ["held", "many", "stress"] {
+        let rough = "domain = { boundary = \"sheared\" }\ncontact = { strategy = \"rough\" }\n";
+        write(folder, "rough.toml", &format!("name = \"rough{dimension}\"\n{head}{rough}{one}{mesh}"));
+        for case in ["held", "many", "stress", "rough"] {
             let out = format!("{case}{dimension}");
             told(folder, &["run", &format!("{case}.toml"), "--out", &out, "--xyz", "1"]);
         }

@@ -100,6 +100,21 @@ fn held_and_driven_particles_are_carried_by_the_same_forces() {
     ranks_are_as_one_process("driven spheres", &solid, &tables, 1.4e-10);
 }
 
+/// Rough spheres that touch, with friction: forces of contacts act in a flow that ranks share.
+#[test]
+fn forces_of_rough_contacts_act_on_all_ranks() {
+    let case = case(
+        "name = \"r\"\ndimension = 3\ndomain = { boundary = \"sheared\" }\n\
+         particles = [{ position = [0.4, 0.58, 0.5], radius = 0.12 },\n\
+                      { position = [0.568, 0.4095, 0.5], radius = 0.12 },\n\
+                      { position = [0.2, 0.2, 0.3], radius = 0.1 }]\n\
+         time = { step = 0.05, end = 0.2 }\ncontact = { strategy = \"rough\", flow_tolerance = 1e-4 }\n\
+         [flow]\nsolver = \"multigrid\"\ntolerance = 1e-11\n\
+         [flow.mesh]\ncells_per_radius = 1.6\nroot_cells = 1\ncoarsest_level = 2\n",
+    );
+    ranks_are_as_one_process("rough spheres", &case, &["", "-rheology"], 1e-7);
+}
+
 /// A line of discs that nearly touch, each faster than the next one. Multigrid does not converge to 1e-10 on
 /// every mesh of such a line; on this one it does.
 fn line_of_discs(end: f64) -> Case {

@@ -51,14 +51,14 @@ mod validate;
 pub use contact::ContactSpec;
 pub use error::{CaseError, CaseIssue, CaseProblem, InvalidCase, IssuePlace, Key, KeyPart};
 pub use flow::{FlowSpec, MeshSpec, PairMobilitySpec, PaperSpec};
-pub use gluey_contact::{ContactLaw as Strategy, GammaUpdate as Memory, SolverKind as ContactSolver};
+pub use gluey_contact::{GammaUpdate as Memory, SolverKind as ContactSolver};
 pub use gluey_motion::Scheme;
 pub use idle_key::IdleKey;
 pub use keys::CaseKey;
 pub use mesh::default_cells_per_radius;
 pub use names::{
-    ArrangementName, Boundary, Formulation, Hydrodynamics, Lubrication, OutputKind, ParticleVelocity,
-    Precision, RadiiKind, Solver, UnknownName,
+    ArrangementName, Boundary, Formulation, Hydrodynamics, Lubrication, Metric, OutputKind, ParticleVelocity,
+    Precision, RadiiKind, Solver, Strategy, UnknownName,
 };
 pub use output::{Interval, OutputSpec};
 pub use overrides::{BadOverride, Override};
@@ -307,6 +307,13 @@ impl Case {
             lattice: Lattice::new(std::array::from_fn(|axis| self.period(axis))),
             ..Domain::default()
         }
+    }
+
+    /// Velocity along itself of a wall of the surroundings in the shear of the case.
+    pub(crate) fn velocity_of_wall<const D: usize>(&self, wall: &Wall<D>) -> Vector<D> {
+        let middle = 0.5 * (self.lower()[WALLED_AXIS] + self.upper()[WALLED_AXIS]);
+        let height = wall.normal[WALLED_AXIS] * wall.offset - middle;
+        Vector::from_fn(|d, _| if d == 0 { self.shear_rate * height } else { 0.0 })
     }
 
     /// Name of the output files of this case: case and strategy, and the formulation where it is not the

@@ -10,10 +10,11 @@ mod prepared;
 
 use std::time::Instant;
 
+use gluey_contact::TwistMobility;
 use gluey_geom::Vector;
 use gluey_levelset::Ball;
-use gluey_motion::{Configuration, Fields, Film, Hydrodynamics, Prediction, ResumeError};
-use gluey_stokes::{Drive, Flow, FlowParams, FlowSolver, NodalFields, Suspension};
+use gluey_motion::{Configuration, Fields, Film, Hydrodynamics, NextLoads, Prediction, ResumeError};
+use gluey_stokes::{Flow, FlowParams, FlowSolver, NodalFields, Suspension};
 use serde::{Deserialize, Serialize};
 
 use crate::case::Case;
@@ -86,19 +87,33 @@ impl<const D: usize> Hydrodynamics<D> for StokesFlow<D> {
     type Error = FlowError;
 
     fn predict(&mut self, configuration: &Configuration<'_, D>) -> Result<Prediction<D>, FlowError> {
-        let Self { suspension, solver, params: FlowParams { viscosity, .. }, .. } = self;
+        self.predict_with_contacts(configuration, &mut |_| None)
+    }
+
+    fn predict_with_contacts(
+        &mut self,
+        configuration: &Configuration<'_, D>,
+        next: &mut NextLoads<'_, D>,
+    ) -> Result<Prediction<D>, FlowError> {
+        let Self { suspension, solver, .. } = self;
         let (balls, start) = (suspension.balls(configuration), Instant::now());
         let mesh = solver.discretised(suspension.mesh(&balls)?);
         let meshed = start.elapsed().as_secs_f64();
-        let solve = |drive: &Drive<'_, D>| solver.solve_driven::<FlowError>(&mesh, &balls, drive);
-        let (mut flow, rate) = suspension.driven(configuration, *viscosity, solve)?;
+        let (mut flow, prediction) = solver.predict::<FlowError>(&mesh, suspension, configuration, next)?;
         flow.times.assembly += meshed;
-        let prediction = suspension.prediction(configuration, *viscosity, &flow, rate);
         let statistics = flow.statistics(solver.take_raised_penalties());
         self.places = configuration.particles.iter().map(|particle| particle.pose.position).collect();
         self.strain = configuration.strain;
         self.last = Some(Last { flow, balls, shear_factor: configuration.shear_factor });
         Ok(Prediction { statistics, ..prediction })
+    }
+
+    fn near_mobility(
+        &self,
+        configuration: &Configuration<'_, D>,
+    ) -> Result<Option<Box<dyn TwistMobility<D>>>, FlowError> {
+        let mobility = self.suspension.near_mobility(configuration, self.params.viscosity)?;
+        Ok(Some(Box::new(mobility)))
     }
 
     fn answers_to_forces(&self) -> bool {

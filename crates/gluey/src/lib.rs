@@ -63,7 +63,9 @@ pub use run::{
     ResumeError, Resumption, RunError, RunOptions, RunRecord, RunState, VtkOptions, XyzOptions, in_full,
     recorded_runs, run,
 };
-pub use simulation::{RestoreError, Simulation, SimulationState, StepError, StrainClock};
+pub use simulation::{
+    FlowIteration, RestoreError, Simulation, SimulationState, Sliding, StepError, StrainClock,
+};
 pub use summary::CaseSummary;
 pub use tally::{StepMotion, Tally};
 pub use text::NotText;

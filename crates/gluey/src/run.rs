@@ -55,7 +55,7 @@ use crate::progress::{Notice, Progress, ProgressState};
 use crate::report::RunReport;
 use crate::simulation::{RestoreError, Simulation, StepError};
 use crate::tally::Tally;
-use contacts::Surrounded;
+use contacts::{CaseContact, Surrounded};
 use frames::{Frames, StreamOptions};
 use last_step::LastStep;
 use last_steps::{OfRun, locked};
@@ -122,7 +122,7 @@ where
     H: gluey_motion::Hydrodynamics<D>,
     HydrodynamicsError: From<H::Error>,
 {
-    let contact = contacts::of_case(case);
+    let contact = CaseContact::of_case(case, |contact| contact);
     RunInProgress::start(case, options, log, hydrodynamics, contact, &RunRanks::alone())?.finish()
 }
 

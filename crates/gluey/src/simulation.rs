@@ -1,12 +1,14 @@
 //! The time loop, one step at a time: predict, correct for contact, integrate.
 
 mod error;
+mod in_contact;
 mod part;
 mod repelling;
+mod state;
 mod strain_clock;
 
 use gluey_contact::{
-    Contact, ContactModel, ContactState, Domain, FilmError, FilmMemory, FilmReport, GapReport, film_reach,
+    Contact, ContactModel, Domain, FilmError, FilmMemory, FilmReport, GapReport, film_reach,
 };
 use gluey_geom::{Dim, Matrix, Particle, Twist};
 use gluey_motion::{
@@ -17,10 +19,13 @@ use gluey_suspension::Repulsion;
 
 use crate::phases::PhaseTable;
 use crate::tally::StepMotion;
+use in_contact::{StepStart, predicted_in_contact};
 use part::Part;
 use repelling::Repelling;
 
 pub use error::{RestoreError, StepError};
+pub use in_contact::FlowIteration;
+pub use state::SimulationState;
 pub use strain_clock::StrainClock;
 
 /// Particles in a flow that `H` predicts, kept apart by `C`.
@@ -68,6 +73,7 @@ pub struct Simulation<const D: usize, H, C> {
     /// The last one, its velocities corrected; of the statistics, those of all flows of the step so far.
     prediction: Prediction<D>,
     gaps: GapReport,
+    iteration: FlowIteration,
     motion: StepMotion,
     phases: PhaseTable,
 }
@@ -81,30 +87,6 @@ pub struct Sliding {
     pub height: f64,
     /// The stress is computed every so many steps, at least 1.
     pub stress_every: usize,
-}
-
-/// Everything a simulation needs to go on as if it had never stopped.
-#[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
-#[serde(bound = "")]
-pub struct SimulationState<const D: usize> {
-    /// Steps done.
-    pub step: usize,
-    /// Whether the shear is reversed.
-    pub reversed: bool,
-    /// Shear strain of the periodic images, where they slide.
-    pub strain: f64,
-    /// Time, where steps are those of the strain.
-    pub clock: Option<StrainClock>,
-    /// Particles.
-    pub particles: Vec<Particle<D>>,
-    /// Velocity history.
-    pub integrator: Integrator<D>,
-    /// Memory of films.
-    pub films: FilmMemory,
-    /// Memory of the contact model.
-    pub contact: ContactState,
-    /// Warm start of the flow, as [`Hydrodynamics::checkpoint`] gave it.
-    pub hydrodynamics: Vec<u8>,
 }
 
 impl<const D: usize, H, C> Simulation<D, H, C>
@@ -133,6 +115,7 @@ where
             contact,
             prediction: Prediction::of(vec![Twist::default(); count]),
             gaps: GapReport::default(),
+            iteration: FlowIteration::default(),
             motion: StepMotion::default(),
             phases: PhaseTable::default(),
         }
@@ -150,6 +133,12 @@ where
     #[must_use]
     pub fn halving(self, most_halvings: u32) -> Self {
         Self { most_halvings, ..self }
+    }
+
+    /// The same where contacts whose forces act in the flow are iterated for so long.
+    #[must_use]
+    pub fn iterating(self, iteration: FlowIteration) -> Self {
+        Self { iteration, ..self }
     }
 
     /// The same with particles that repel each other, their images and the walls of `surroundings`.
@@ -229,7 +218,8 @@ where
 
     /// What the flow says of the particles where they are, and of the forces by which they repel each other.
     fn predicted(&mut self) -> Result<Prediction<D>, StepError<H::Error>> {
-        let (step, time, strain, particles) = (self.step, self.time(), self.strain, &self.particles[..]);
+        let (step, time, strain) = (self.step, self.time(), self.strain);
+        let particles = &self.particles[..];
         let is_due = |sliding: Sliding| self.part.is_first() && step.is_multiple_of(sliding.stress_every);
         let with_stress = self.sliding.is_some_and(is_due);
         let tilt = strain * self.sliding.map_or(0.0, |sliding| sliding.height);
@@ -238,14 +228,42 @@ where
         if !(wrenches.is_empty() || self.hydrodynamics.answers_to_forces()) {
             return Err(StepError::Forces { step, time, source: NoForces });
         }
-        let (shear_factor, wrenches) = (self.shear_factor(), &wrenches[..]);
-        let now = Configuration { time, particles, shear_factor, strain, with_stress, wrenches, pair_stress };
-        self.hydrodynamics.predict(&now).map_err(|source| StepError::Flow { step, time, source })
+        let (shear_factor, wrenches, contacts) = (self.shear_factor(), &wrenches[..], None);
+        let start = StepStart {
+            integrator: &self.integrator,
+            step,
+            dt: self.dt,
+            part: self.part,
+            most_halvings: self.most_halvings,
+            limits: self.iteration,
+            tilt,
+            slide: self.slide(),
+        };
+        let now = Configuration {
+            time,
+            particles,
+            shear_factor,
+            strain,
+            with_stress,
+            wrenches,
+            pair_stress,
+            contacts,
+        };
+        let Some(contact) = self.contact.in_flow() else {
+            return self.hydrodynamics.predict(&now).map_err(|source| StepError::Flow { step, time, source });
+        };
+        let found = predicted_in_contact(&mut self.hydrodynamics, contact, &now, start)?;
+        (self.part, self.gaps) = (found.part, found.gaps);
+        Ok(found.prediction)
     }
 
     /// Corrects the predicted velocities so that films that lubrication keeps open stay open, halving the
     /// step until they do, and so that nothing overlaps.
     pub fn correct(&mut self) -> Result<(), StepError<H::Error>> {
+        if let Some(contact) = self.contact.in_flow() {
+            contact.finish();
+            return Ok(());
+        }
         let films = self.open_films()?;
         let (step, time, dt) = (self.step, self.time(), self.part_length());
         if let Some(Sliding { height, .. }) = self.sliding {
@@ -261,7 +279,7 @@ where
             source,
         })?;
         if self.part.is_first() {
-            self.gaps = GapReport { films, contacts };
+            self.gaps = GapReport { films, contacts, changes: Vec::new() };
         }
         self.gaps.films.largest_push = self.gaps.films.largest_push.max(films.largest_push);
         Ok(())

@@ -26,8 +26,8 @@ pub struct RunArguments {
     #[arg(long, value_name = "KEY=VALUE")]
     set: Vec<Override>,
     /// What keeps particles from overlapping, instead of the case's choice: none, velocity-correction,
-    /// inelastic, gluey.
-    #[arg(long)]
+    /// inelastic, gluey, rough.
+    #[arg(long, value_parser = by_name::<Strategy>)]
     strategy: Option<Strategy>,
     /// How rigidity enters the flow, instead of the case's choice: unfitted, paper.
     #[arg(long, value_parser = by_name::<Formulation>)]

@@ -1,21 +1,41 @@
 //! What a case says of contact.
 
 use gluey_contact::{
-    ContactLaw as Strategy, ContactParams, GammaUpdate as Memory, SolverKind as ContactSolver,
+    ContactLaw, ContactParams, FlowContactParams, Friction, GammaUpdate as Memory, NormalLaw,
+    SolverKind as ContactSolver,
 };
 use schemars::{JsonSchema, Schema, SchemaGenerator};
 use serde::{Deserialize, Serialize};
 
-use super::names::schema_of_names;
+use super::names::{Metric, Strategy, schema_of_names};
 
 /// Contact.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct ContactSpec {
-    /// The contact law, which keeps particles from overlapping; `none` leaves that to the flow. Default:
-    /// "gluey".
-    #[schemars(schema_with = "strategies")]
+    /// The contact law, which keeps particles from overlapping; `none` leaves that to the flow. Forces of
+    /// `rough` contacts act in the flow, those of the others correct velocities after it. Default: "gluey".
     pub strategy: Strategy,
+    /// How contact forces move particles: `flow` (they act in the flow of the step, which is solved again
+    /// until they agree with it) or `drag` (each particle feels its own Stokes drag, after the flow: the
+    /// paper's). Default: "flow" for `rough`, "drag" for the others.
+    pub metric: Option<Metric>,
+    /// Smallest gap of `rough` surfaces. Unit: mean radius of the pair. Default: 0.005.
+    #[schemars(extend("exclusiveMinimum" = 0), range(max = 0.5))]
+    pub roughness: f64,
+    /// Coefficient of friction between `rough` surfaces; 0 for none, `inf` for surfaces that never slip.
+    /// Unit: none. Default: 0.5.
+    #[schemars(range(min = 0))]
+    pub friction: f64,
+    /// Normal force below which a contact of `rough` surfaces is without friction. Unit: 6 pi viscosity a^2
+    /// times the shear rate with the mean radius a; where the shear stress is given, viscosity length^2/time.
+    /// Default: 0.
+    #[schemars(range(min = 0))]
+    pub friction_load: f64,
+    /// Change of the forces of `rough` contacts over their size, by their power, at which a step needs no
+    /// other flow with them. Unit: none. Default: 0.05.
+    #[schemars(extend("exclusiveMinimum" = 0), range(max = 1))]
+    pub flow_tolerance: f64,
     /// Whether the constraint is linearised again at the end of the step, until gaps are >= 0 to round-off.
     /// Default: true.
     pub exact_gap: bool,
@@ -43,10 +63,31 @@ pub struct ContactSpec {
 }
 
 impl ContactSpec {
+    /// Whether the forces of contacts act in the flow, by the strategy unless the case says so.
+    pub fn metric(&self) -> Metric {
+        let usual = if self.strategy == Strategy::Rough { Metric::Flow } else { Metric::Drag };
+        self.metric.unwrap_or(usual)
+    }
+
+    /// These parameters as the model of contacts in the flow takes them, where a critical load of one is
+    /// this; `None` where contacts correct velocities after the flow.
+    pub fn in_flow(&self, unit_of_load: f64) -> Option<FlowContactParams> {
+        let (law, friction) = match self.strategy.law() {
+            None => {
+                let load = self.friction_load * unit_of_load;
+                let friction = Friction { coefficient: self.friction, load };
+                (NormalLaw::Rough { roughness: self.roughness }, friction)
+            }
+            Some(_) => (NormalLaw::Smooth(self.params()), Friction::default()),
+        };
+        let params = FlowContactParams { law, friction, ..FlowContactParams::default() };
+        (self.metric() == Metric::Flow).then_some(params)
+    }
+
     /// These parameters as the contact model takes them.
     pub fn params(&self) -> ContactParams {
         ContactParams {
-            law: self.strategy,
+            law: self.strategy.law().unwrap_or(ContactLaw::None),
             exact_gap: self.exact_gap,
             gamma_update: self.memory,
             gamma_min: self.gamma_min,
@@ -60,10 +101,14 @@ impl ContactSpec {
 
 impl Default for ContactSpec {
     fn default() -> Self {
-        let ContactParams { law: strategy, gamma_min, threshold, solver, tolerance, .. } =
-            ContactParams::default();
+        let ContactParams { gamma_min, threshold, solver, tolerance, .. } = ContactParams::default();
         Self {
-            strategy,
+            strategy: Strategy::default(),
+            metric: None,
+            roughness: 5e-3,
+            friction: 0.5,
+            friction_load: 0.0,
+            flow_tolerance: FlowContactParams::FLOW_TOLERANCE,
             exact_gap: true,
             memory: Memory::Consistent,
             gamma_min,
@@ -72,10 +117,6 @@ impl Default for ContactSpec {
             tolerance,
         }
     }
-}
-
-fn strategies(_: &mut SchemaGenerator) -> Schema {
-    schema_of_names(&Strategy::ALL)
 }
 
 fn memories(_: &mut SchemaGenerator) -> Schema {

@@ -1,9 +1,12 @@
 //! Forces and torques on the particles of a case.
 
+use std::f64::consts::PI;
+
+use gluey_contact::FlowContactParams;
 use gluey_geom::{Dim, Vector, Wrench};
 use gluey_suspension::{Repulsion, ball_volume};
 
-use super::{Case, ParticleSpec, RepulsionSpec};
+use super::{Case, Metric, ParticleSpec, RepulsionSpec};
 
 impl Case {
     /// Whether anything beside fluid, contact and what drives particles acts, that stays when the shear is
@@ -17,6 +20,21 @@ impl Case {
     pub fn repulsion(&self) -> Option<Repulsion> {
         let (RepulsionSpec { force, range }, radius) = (&self.repulsion, self.mean_radius());
         (*force > 0.0).then_some(Repulsion { force: *force, range: range * radius, radius })
+    }
+
+    /// Whether forces of contacts act in the flow.
+    pub(crate) fn acts_in_flow(&self) -> bool {
+        self.contact.metric() == Metric::Flow
+    }
+
+    /// Contacts of a checked case whose forces act in the flow, in a fluid of viscosity one; `None` where
+    /// they do not.
+    pub(crate) fn flow_contact(&self) -> Option<FlowContactParams> {
+        let unit_of_load = match self.shear_stress {
+            Some(_) => 1.0,
+            None => 6.0 * PI * self.mean_radius().powi(2) * self.shear_rate.abs(),
+        };
+        self.contact.in_flow(unit_of_load)
     }
 
     /// Force and torque on each particle of a checked case; no entries where there are none on any.

@@ -5,7 +5,7 @@ use toml::Value;
 use super::idle_key::IdleKey;
 use super::names::{ArrangementName, OutputKind, Precision, RadiiKind};
 use super::{
-    Boundary, Case, ContactSpec, FlowSpec, Formulation, Hydrodynamics, RepulsionSpec, Strategy,
+    Boundary, Case, ContactSpec, FlowSpec, Formulation, Hydrodynamics, Metric, RepulsionSpec, Strategy,
     SuspensionSpec,
 };
 use crate::number_text::shown;
@@ -34,7 +34,8 @@ impl Case {
             Hydrodynamics::PairMobility => Formulation::default(),
         };
         case.flow = FlowSpec { hydrodynamics, formulation, ..FlowSpec::default() };
-        case.contact = ContactSpec { strategy: self.contact.strategy, ..ContactSpec::default() };
+        let ContactSpec { strategy, metric, .. } = self.contact;
+        case.contact = ContactSpec { strategy, metric, ..ContactSpec::default() };
         case.repulsion = RepulsionSpec::default();
         case.domain.boundary = Boundary::default();
         (case.time.reverse_at, case.time.strain_amplitude) = (None, None);
@@ -70,7 +71,10 @@ impl Case {
         if self.is_penalty() {
             add(&["flow.paper.rho"], "flow.paper.uzawa_steps = 1".to_owned());
         }
-        add(idle_of_contact(&self.contact), format!("contact.strategy = \"{}\"", self.contact.strategy));
+        if self.contact.metric() == Metric::Drag {
+            add(&["contact.flow_tolerance"], format!("contact.metric = \"{}\"", Metric::Drag));
+        }
+        add(&idle_of_contact(&self.contact), format!("contact.strategy = \"{}\"", self.contact.strategy));
         if self.repulsion.force == 0.0 {
             add(&["repulsion.range"], "repulsion.force = 0".to_owned());
         }
@@ -94,23 +98,23 @@ impl Case {
     }
 }
 
+/// Keys of contact and the strategies that ask for them.
+const KEYS_OF_CONTACT: [(&str, &[Strategy]); 9] = [
+    ("contact.exact_gap", &[Strategy::Inelastic, Strategy::Gluey]),
+    ("contact.memory", &[Strategy::Gluey]),
+    ("contact.gamma_min", &[Strategy::Gluey]),
+    ("contact.threshold", &[Strategy::VelocityCorrection]),
+    ("contact.solver", &[Strategy::Inelastic, Strategy::Gluey]),
+    ("contact.tolerance", &[Strategy::VelocityCorrection, Strategy::Inelastic, Strategy::Gluey]),
+    ("contact.roughness", &[Strategy::Rough]),
+    ("contact.friction", &[Strategy::Rough]),
+    ("contact.friction_load", &[Strategy::Rough]),
+];
+
 /// What a contact law does not ask for.
-fn idle_of_contact(contact: &ContactSpec) -> &'static [&'static str] {
-    match contact.strategy {
-        Strategy::None => &[
-            "contact.exact_gap",
-            "contact.memory",
-            "contact.gamma_min",
-            "contact.threshold",
-            "contact.solver",
-            "contact.tolerance",
-        ],
-        Strategy::VelocityCorrection => {
-            &["contact.exact_gap", "contact.memory", "contact.gamma_min", "contact.solver"]
-        }
-        Strategy::Inelastic => &["contact.memory", "contact.gamma_min", "contact.threshold"],
-        Strategy::Gluey => &["contact.threshold"],
-    }
+fn idle_of_contact(contact: &ContactSpec) -> Vec<&'static str> {
+    let asks = |strategies: &[Strategy]| strategies.contains(&contact.strategy);
+    KEYS_OF_CONTACT.iter().filter(|key| !asks(key.1)).map(|key| key.0).collect()
 }
 
 /// The keys that do nothing where particles are generated.

@@ -3,6 +3,7 @@
 use std::fmt;
 use std::str::FromStr;
 
+use gluey_contact::ContactLaw;
 use schemars::{JsonSchema, Schema};
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
@@ -97,6 +98,48 @@ named! {
         /// The fluid ends at the true surfaces, wherever these cut the mesh.
         #[default]
         Unfitted = "unfitted",
+    }
+}
+
+named! {
+    /// What keeps particles from overlapping.
+    Strategy, "strategy" {
+        /// Nothing but the flow.
+        None = "none",
+        /// Pushes after the move, see [`ContactLaw::VelocityCorrection`].
+        VelocityCorrection = "velocity-correction",
+        /// Contacts that never pull, see [`ContactLaw::Inelastic`].
+        Inelastic = "inelastic",
+        /// Contacts with a memory, see [`ContactLaw::Gluey`].
+        #[default]
+        Gluey = "gluey",
+        /// Rough surfaces with friction, whose forces act in the flow, see [`gluey_contact::FlowContact`].
+        Rough = "rough",
+    }
+}
+
+named! {
+    /// Metric in which contact forces move particles.
+    Metric, "metric of contact" {
+        /// That of the flow: forces act in it.
+        Flow = "flow",
+        /// That of the Stokes drag of each particle, after the flow.
+        #[default]
+        Drag = "drag",
+    }
+}
+
+impl Strategy {
+    /// The law of [`gluey_contact::PairContact`] of this name; `None` for contacts whose forces act in the
+    /// flow.
+    pub fn law(self) -> Option<ContactLaw> {
+        match self {
+            Self::None => Some(ContactLaw::None),
+            Self::VelocityCorrection => Some(ContactLaw::VelocityCorrection),
+            Self::Inelastic => Some(ContactLaw::Inelastic),
+            Self::Gluey => Some(ContactLaw::Gluey),
+            Self::Rough => None,
+        }
     }
 }
 

@@ -5,10 +5,10 @@ use super::error::{CaseProblem, Key};
 use super::findings::CaseFindings;
 use super::given::{check_force_density, check_motion};
 use super::given_stress::{check_rheology, check_shear_stress, check_stress_alone, check_stress_of_free};
-use super::names::{Boundary, Formulation, Hydrodynamics, Lubrication, is_file_name};
+use super::names::{Boundary, Formulation, Hydrodynamics, Lubrication, Metric, is_file_name};
 use super::neighbours::{NearParticles, nearer_than};
 use super::particle_problem::ParticleProblem;
-use super::{Case, ParticleSpec, fill};
+use super::{Case, ParticleSpec, Strategy, fill};
 use crate::reference::ReferenceSolution;
 
 /// Largest number of steps.
@@ -71,6 +71,7 @@ pub(super) fn check_mutual(case: &Case, findings: &mut CaseFindings) {
     }
     if findings.are_good(&fill::NEEDED) && !case.particles.is_empty() {
         check_flow(case, &root.name("flow"), findings);
+        check_contact(case, &root.name("contact"), findings);
     }
     if findings.is_empty() {
         check_reference(case, root.name("reference"), findings);
@@ -218,6 +219,37 @@ fn check_answered(case: &Case, key: &Key, findings: &mut CaseFindings) {
     if found != Hydrodynamics::Stokes {
         let needs = format!("flow.hydrodynamics = \"{}\"", Hydrodynamics::Stokes);
         findings.unfit(key.clone(), "a force", needs, format!("\"{found}\""));
+    }
+}
+
+/// Contacts whose forces act in the flow need one that answers to them, and films where they are rough; those
+/// of smooth surfaces are for flows without films, which would keep these apart by themselves.
+fn check_contact(case: &Case, key: &Key, findings: &mut CaseFindings) {
+    let (flow, contact) = (&case.flow, &case.contact);
+    let (strategy, metric) = (contact.strategy, contact.metric());
+    let is_rough = strategy == Strategy::Rough;
+    if is_rough && metric == Metric::Drag {
+        let found = format!("\"{metric}\"");
+        let needs = format!("metric = \"{}\"", Metric::Flow);
+        return findings.unfit(key.name("strategy"), format!("\"{strategy}\""), needs, found);
+    }
+    if metric == Metric::Drag {
+        return;
+    }
+    if !(is_rough || matches!(strategy, Strategy::Inelastic | Strategy::Gluey)) {
+        let needs = "the strategy \"rough\", \"gluey\" or \"inelastic\"".to_owned();
+        return findings.unfit(key.name("metric"), format!("\"{metric}\""), needs, format!("\"{strategy}\""));
+    }
+    let lubrication = if is_rough { Lubrication::Deficit } else { Lubrication::None };
+    let wanted = [
+        ("flow.hydrodynamics", Hydrodynamics::Stokes.name(), flow.hydrodynamics.name()),
+        ("flow.formulation", Formulation::Unfitted.name(), flow.formulation.name()),
+        ("flow.lubrication", lubrication.name(), case.lubrication().name()),
+    ];
+    if let Some((name, needed, found)) = wanted.into_iter().find(|(_, needed, found)| needed != found) {
+        let choice = format!("\"{strategy}\" in the metric of the flow");
+        let needs = format!("{name} = \"{needed}\"");
+        findings.unfit(key.name("strategy"), choice, needs, format!("\"{found}\""));
     }
 }
 

@@ -6,7 +6,7 @@ use std::rc::Rc;
 use gluey_distributed::{BoxFlow, FlowMemory, SharedContact, SharedHydrodynamics, SharedSuspension};
 use gluey_parallel::{Communicator, Ranks};
 
-use super::contacts;
+use super::contacts::CaseContact;
 use super::sharing::RunRanks;
 use super::{RunError, RunInProgress, RunOptions, flow_pieces, prepare};
 use crate::case::{Case, Formulation, Hydrodynamics, Solver};
@@ -50,7 +50,7 @@ fn run_beside<const D: usize>(
         flow_pieces::restore(case, checkpoint, &suspension, ranks, &memory)?;
     }
     let flow = SharedHydrodynamics::new(&suspension, ranks).remembering(memory.clone());
-    let contact = SharedContact::new(contacts::of_case(case), ranks);
+    let contact = CaseContact::of_case(case, |contact| SharedContact::new(contact, ranks));
     let keep_flow = |checkpoint: &Path, name| flow_pieces::write(checkpoint, name, &memory.saved());
     let sharing = RunRanks { ranks: ranks.clone(), keep_flow: Some(&keep_flow) };
     let prepared = sharing.is_first().then(|| prepare(case, options, progress)).transpose();

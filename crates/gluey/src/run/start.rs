@@ -1,7 +1,7 @@
 //! The simulation that a case is.
 
 use crate::case::Case;
-use crate::simulation::{Simulation, Sliding};
+use crate::simulation::{FlowIteration, Simulation, Sliding};
 use gluey_contact::ContactModel;
 
 /// A case at time 0.
@@ -16,7 +16,8 @@ where
 {
     let (scheme, dt) = (case.time.scheme, case.time.step);
     let mut simulation = Simulation::new(case.start(), scheme, dt, hydrodynamics, contact);
-    simulation = simulation.halving(case.time.halvings);
+    let iteration = FlowIteration { tolerance: case.contact.flow_tolerance, ..FlowIteration::default() };
+    simulation = simulation.halving(case.time.halvings).iterating(iteration);
     if case.has_forces() {
         simulation = simulation.under_forces();
     }

@@ -63,7 +63,10 @@ impl RunTables {
         let [rheology, forces] = paths(case, csv);
         Ok(Self {
             trajectory: CsvWriter::create::<D>(csv, case.particles.len())?,
-            rheology: create(rheology, rheology::header::<D>(case.shear_stress.is_some()))?,
+            rheology: create(
+                rheology,
+                rheology::header::<D>(case.shear_stress.is_some(), case.acts_in_flow()),
+            )?,
             forces: create(forces, forces::header::<D>(case.given_particles()))?,
             solver: SolverLog::create(csv)?,
         })

@@ -1,0 +1,160 @@
+//! Contacts whose forces act in the flow of a step: flow after flow, until they no longer change.
+
+use gluey_contact::{
+    BodyStep, ContactError, FlowContactParams, FlowContactReport, FlowForces, GapReport, TwistMobility,
+};
+use gluey_geom::{Particle, Twist};
+use gluey_motion::{Configuration, ContactLoads, Hydrodynamics, Integrator, NoForces, Prediction};
+
+use super::error::StepError;
+use super::part::Part;
+
+/// The first flow of a step with contacts is so many times less accurate than the last: its forces change.
+const FIRST_LOOSENESS: f64 = 1000.0;
+
+/// Limits of the iteration by which forces of contacts in the flow become those of the step.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct FlowIteration {
+    /// Their change by a flow, over their size, by the power that they have.
+    pub tolerance: f64,
+    /// Flows of a step at most.
+    pub most_flows: usize,
+}
+
+impl Default for FlowIteration {
+    fn default() -> Self {
+        Self { tolerance: FlowContactParams::FLOW_TOLERANCE, most_flows: 20 }
+    }
+}
+
+/// A step that begins, and the part of it that is to be done.
+#[derive(Clone, Copy)]
+pub(super) struct StepStart<'a, const D: usize> {
+    pub integrator: &'a Integrator<D>,
+    /// Steps done before.
+    pub step: usize,
+    /// Length of a whole step.
+    pub dt: f64,
+    /// Halved where contacts find no forces.
+    pub part: Part,
+    pub most_halvings: u32,
+    pub limits: FlowIteration,
+    /// Displacement of the image one period up, and its velocity.
+    pub tilt: f64,
+    pub slide: f64,
+}
+
+/// A prediction with velocities that contacts allow.
+pub(super) struct Found<const D: usize> {
+    pub prediction: Prediction<D>,
+    /// The part of the step for which there are forces.
+    pub part: Part,
+    pub gaps: GapReport,
+}
+
+/// What the flow says of particles between which contact forces act.
+pub(super) fn predicted_in_contact<const D: usize, H: Hydrodynamics<D>>(
+    hydrodynamics: &mut H,
+    contact: &mut dyn FlowForces<D>,
+    now: &Configuration<'_, D>,
+    start: StepStart<'_, D>,
+) -> Result<Found<D>, StepError<H::Error>> {
+    let (step, time) = (start.step, now.time);
+    let flow_failed = |source| StepError::Flow { step, time, source };
+    let contact_failed = |source| StepError::Contact { step, time, source };
+    let mobility = hydrodynamics.near_mobility(now).map_err(flow_failed)?;
+    let mut iteration = ContactIteration {
+        start,
+        particles: now.particles,
+        shear_factor: now.shear_factor,
+        contact,
+        mobility: mobility.ok_or(StepError::Forces { step, time, source: NoForces })?,
+        changes: Vec::new(),
+        is_loose: false,
+        corrected: Ok(Default::default()),
+    };
+    let loads = iteration.begin().map_err(contact_failed)?;
+    let now = Configuration { contacts: Some(&loads), ..*now };
+    let predicted = hydrodynamics.predict_with_contacts(&now, &mut |flow| iteration.after(flow));
+    let ContactIteration { start: StepStart { part, .. }, changes, corrected, .. } = iteration;
+    let prediction = predicted.map_err(flow_failed)?;
+    let (twists, report) = corrected.map_err(contact_failed)?;
+    let gaps = GapReport { contacts: report.contact, changes, ..GapReport::default() };
+    Ok(Found { prediction: Prediction { twists, ..prediction }, part, gaps })
+}
+
+/// The iteration of a step.
+struct ContactIteration<'a, const D: usize> {
+    start: StepStart<'a, D>,
+    particles: &'a [Particle<D>],
+    shear_factor: f64,
+    contact: &'a mut dyn FlowForces<D>,
+    mobility: Box<dyn TwistMobility<D>>,
+    /// Changes of the forces by each flow so far.
+    changes: Vec<f64>,
+    /// Whether the last flow was less accurate than it is to be in the end.
+    is_loose: bool,
+    /// Velocities after the last flow.
+    corrected: Result<(Vec<Twist<D>>, FlowContactReport), ContactError>,
+}
+
+impl<const D: usize> ContactIteration<'_, D> {
+    /// The loads that the first flow has: those of the last step.
+    fn begin(&mut self) -> Result<ContactLoads<D>, ContactError> {
+        self.with_step(|contact, _, step| contact.begin(step))?;
+        let looseness = if self.contact.forces().is_empty() { 1.0 } else { FIRST_LOOSENESS };
+        self.loads(looseness)
+    }
+
+    /// Corrects the velocities of a flow; the loads that another flow is to have, if the forces have changed.
+    fn after(&mut self, prediction: &Prediction<D>) -> Option<ContactLoads<D>> {
+        self.contact.set_rate(prediction.rate);
+        self.corrected = self.correct(&prediction.twists);
+        let Ok((_, report)) = &self.corrected else { return None };
+        self.changes.push(report.change);
+        let FlowIteration { tolerance, most_flows } = self.start.limits;
+        let is_loose = std::mem::take(&mut self.is_loose);
+        if report.change <= tolerance && !is_loose {
+            return None;
+        }
+        if self.changes.len() >= most_flows {
+            let changes = self.changes.clone();
+            self.corrected = Err(ContactError::FlowNotConverged { changes, tolerance });
+            return None;
+        }
+        let loads = self.loads(1.0);
+        loads.map_err(|error| self.corrected = Err(error)).ok()
+    }
+
+    /// Halves the step until there are forces.
+    fn correct(&mut self, flow: &[Twist<D>]) -> Result<(Vec<Twist<D>>, FlowContactReport), ContactError> {
+        loop {
+            let mut twists = flow.to_vec();
+            let found =
+                self.with_step(|contact, mobility, step| contact.correct(step, mobility, &mut twists));
+            let StepStart { part, most_halvings, .. } = self.start;
+            match found {
+                Ok(report) => return Ok((twists, report)),
+                Err(error) => self.start.part = part.halved(most_halvings).ok_or(error)?,
+            }
+        }
+    }
+
+    /// The loads for a flow that may be so many times less accurate than the last one of the step.
+    fn loads(&mut self, looseness: f64) -> Result<ContactLoads<D>, ContactError> {
+        self.is_loose = looseness > 1.0;
+        let wrenches = self.with_step(|contact, _, step| contact.loads(step))?;
+        let [normal, stress_of_friction] = self.contact.stresses();
+        Ok(ContactLoads { wrenches, stress: normal + stress_of_friction, stress_of_friction, looseness })
+    }
+
+    fn with_step<T>(
+        &mut self,
+        act: impl FnOnce(&mut dyn FlowForces<D>, &mut dyn TwistMobility<D>, &BodyStep<'_, D>) -> T,
+    ) -> T {
+        let StepStart { integrator, dt, part, tilt, slide, .. } = self.start;
+        let length = dt * part.share();
+        self.contact.set_surroundings(tilt, slide * length, self.shear_factor);
+        integrator.with_step(length, self.particles, |step| act(self.contact, &mut *self.mobility, step))
+    }
+}

@@ -1,0 +1,107 @@
+//! Rough particles with friction, whose contact forces act in the flow.
+
+use gluey::Case;
+
+use crate::runs::{self, beside, case, column, ran};
+
+/// Rough particles that start in contact or nearly, in a box that is sheared.
+fn crowd(dimension: usize, cells_per_radius: f64, rest: &str) -> Case {
+    let (fraction, count) = if dimension == 2 { (0.55, 12) } else { (0.4, 6) };
+    case(&format!(
+        "name = \"r\"\ndimension = {dimension}\ndomain = {{ boundary = \"sheared\" }}\n\
+         suspension = {{ volume_fraction = {fraction}, count = {count}, seed = 5, min_gap = 0.006 }}\n{rest}\n\
+         [flow.mesh]\ncells_per_radius = {cells_per_radius:?}\ncoarsest_level = 2\n"
+    ))
+}
+
+const ROUGH: &str = "contact = { strategy = \"rough\", friction = 0.5, roughness = 0.005 }\n\
+                     time = { step = 0.02, end = 0.4 }";
+
+/// No gap is below the roughness, contacts carry a part of the stress, and the power of the shear is that
+/// which fluid, films and friction dissipate.
+fn crowds_keep_their_roughness_and_their_power<const D: usize>(cells_per_radius: f64, most: f64) {
+    let names = ["viscosity", "viscosity_by_dissipation", "viscosity_of_contacts", "viscosity_of_friction"];
+    let case = crowd(D, cells_per_radius, ROUGH);
+    let (columns, gaps, flows) = ran(&case, |csv| {
+        let columns = names.map(|name| column(&beside(csv, "rheology"), name));
+        (columns, column(csv, "min_gap_over_a"), column(&beside(csv, "solver"), "flows_in_contact"))
+    });
+    let [viscosity, by_power, contacts, friction] = &columns;
+    let miss = viscosity.iter().zip(by_power).map(|(a, b)| (a / b - 1.0).abs()).fold(0.0, f64::max);
+    let [share, held] = [contacts, friction].map(|share| share.iter().copied().fold(0.0, f64::max));
+    let smallest = gaps.iter().copied().fold(f64::INFINITY, f64::min);
+    println!(
+        "{D}D: miss {miss:.1e}, contacts up to {share:.2}, friction {held:.3}, smallest gap {smallest:.9} a"
+    );
+    println!("flows: {flows:?}");
+    assert!(miss < most, "{miss}");
+    assert!(share > 0.3 && held.abs() > 1e-3, "{share} {held}");
+    assert!(smallest > 0.005 - 1e-9, "{smallest}");
+    assert!(flows.iter().any(|flows| *flows > 1.0));
+}
+
+#[test]
+fn discs_keep_their_roughness_and_their_power() {
+    crowds_keep_their_roughness_and_their_power::<2>(4.0, 0.02);
+}
+
+#[test]
+fn spheres_keep_their_roughness_and_their_power() {
+    crowds_keep_their_roughness_and_their_power::<3>(1.6, 0.06);
+}
+
+#[test]
+fn runs_resume_bit_by_bit() {
+    let rest = "contact = { strategy = \"rough\" }\ntime = { step = 0.02, end = 0.3, reverse_at = 0.22 }";
+    runs::resumes_bit_by_bit(&crowd(2, 3.0, rest), 8, &["rheology"]);
+}
+
+#[test]
+fn threads_do_not_matter() {
+    let rest = "contact = { strategy = \"rough\" }\ntime = { step = 0.02, end = 0.2 }";
+    runs::threads_give_the_same_bits(&crowd(3, 1.0, rest), &["rheology"]);
+}
+
+/// A sphere between walls that another one pushes against a wall, held ones beside it: all that forces of
+/// contacts act on.
+#[test]
+fn walls_and_held_spheres_are_touched() {
+    let case = case(
+        "name = \"w\"\ndimension = 3\n\
+         particles = [{ position = [0.4, 0.1005, 0.5], radius = 0.1, force = [0.0, -1.0, 0.0] },\n\
+                      { position = [0.602, 0.101, 0.5], radius = 0.1, held = true }]\n\
+         time = { step = 0.05, end = 0.5 }\n\
+         domain = { boundary = \"periodic\" }\n\
+         contact = { strategy = \"rough\", roughness = 0.005, friction = 1.0 }\n\
+         flow = { mesh = { cells_per_radius = 1.6 } }",
+    );
+    let (heights, gaps) = ran(&case, |csv| (column(csv, "y1"), column(csv, "gap12_over_a")));
+    println!("{heights:?}\n{gaps:?}");
+    assert!(heights.iter().all(|y| *y > 0.1005 - 1e-9), "{heights:?}");
+    assert!(heights[1..].iter().all(|y| *y < 0.1005 + 1e-3));
+    assert!(gaps.iter().all(|gap| *gap > 0.005 - 1e-9));
+}
+
+/// Gluey contact in the metric of the flow, in a flow without films: there and back.
+#[test]
+fn gluey_contact_in_the_flow_is_reversible() {
+    let end_of = |strategy: &str, step: f64| {
+        let rest = format!(
+            "contact = {{ strategy = \"{strategy}\", metric = \"flow\" }}\n\
+             time = {{ step = {step}, end = 0.8, reverse_at = 0.4 }}\n\
+             flow = {{ lubrication = \"none\", mesh = {{ cells_per_radius = 3.0, coarsest_level = 2 }} }}"
+        );
+        let case = case(&format!(
+            "name = \"g\"\ndimension = 2\ndomain = {{ boundary = \"sheared\" }}\n\
+             suspension = {{ volume_fraction = 0.5, count = 12, seed = 5, min_gap = 0.006 }}\n{rest}\n"
+        ));
+        ran(&case, |csv| {
+            let rows = runs::centers::<2>(csv, 12);
+            runs::rms_distance(&rows[0], &rows[rows.len() - 1])
+        })
+    };
+    let [coarse, fine] = [0.04, 0.02].map(|step| end_of("gluey", step));
+    let inelastic = end_of("inelastic", 0.02);
+    println!("gluey {coarse:.2e} {fine:.2e}, inelastic {inelastic:.2e}");
+    assert!(fine < 0.5 * coarse && fine < 0.2 * inelastic, "{coarse} {fine} {inelastic}");
+}
