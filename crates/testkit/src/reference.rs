@@ -134,6 +134,12 @@ reference_table!(
     "sphere_pair_1to2.csv"
 );
 reference_table!(
+    /// Rough pairs of equal spheres in contact, in shear: `eps, mu, psi, theta, Fn, Ftx, Fty, Ftz, wx, wy, wz,
+    /// slip, S_flow, S_induced, S_contact`.
+    rough_pairs,
+    "rough_pairs.csv"
+);
+reference_table!(
     /// Square (0) and hexagonal (1) lattices of discs:
     /// `lattice, phi, gap_over_a, drag_F_over_muU, eta_axes_strain, eta_shear, rel_diff_drag`.
     lattices_of_discs,

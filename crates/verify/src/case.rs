@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::fmt::Write;
 
-use gluey_contact::FilmError;
+use gluey_contact::{ContactError, FilmError};
 use gluey_motion::PairMobilityError;
 use gluey_stokes::StokesError;
 use gluey_stokes::fem::MeshError;
@@ -42,6 +42,9 @@ pub enum VerifyError {
     /// In the films of a step.
     #[error(transparent)]
     Films(#[from] FilmError),
+    /// In contacts.
+    #[error(transparent)]
+    Contact(#[from] ContactError),
     /// In the configuration of particles.
     #[error(transparent)]
     Packing(#[from] PackingError),

@@ -15,6 +15,7 @@ mod linear_flow;
 mod manufactured;
 mod pair_stresslets;
 mod random_pairs;
+mod rough_pairs;
 mod sheared;
 mod spheres;
 mod symmetry;
@@ -35,6 +36,7 @@ pub const CASES: &[VerificationCase] = &[
     spheres::CASE,
     pair_stresslets::CASE,
     unequal_pairs::CASE,
+    rough_pairs::CASE,
     wall::DISC,
     wall::SPHERE,
     lattices::CASE,
