@@ -276,8 +276,8 @@ fn written(folder: &Path, found: &mut Vec<(&'static str, String)>) {
     }
 }
 
-/// Runs with every optional table, in 2D and 3D: few and many particles, contact of two kinds and repulsion, a
-/// given stress, particles that are held, two radii, frames and their analysis, and a study.
+/// Runs with every optional table, in 2D and 3D: few and many particles, contact of two kinds and repulsion,
+/// a given stress, particles that are held, two radii, frames and their analysis, and a study.
 fn all_tables(folder: &Path) {
     let mesh = "[flow.mesh]\ncells_per_radius = 1.0\n";
     for dimension in [2, 3] {

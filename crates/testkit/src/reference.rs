@@ -134,8 +134,8 @@ reference_table!(
     "sphere_pair_1to2.csv"
 );
 reference_table!(
-    /// Rough pairs of equal spheres in contact, in shear: `eps, mu, psi, theta, Fn, Ftx, Fty, Ftz, wx, wy, wz,
-    /// slip, S_flow, S_induced, S_contact`.
+    /// Rough pairs of equal spheres in contact, in shear: `eps, mu, psi, theta, Fn, Ftx, Fty, Ftz, wx, wy,
+    /// wz, slip, S_flow, S_induced, S_contact`.
     rough_pairs,
     "rough_pairs.csv"
 );

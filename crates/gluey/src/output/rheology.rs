@@ -3,12 +3,13 @@
 //! Viscosities are over that of the fluid, stresses over viscosity and size of the shear rate. `viscosity` is
 //! by the stresslets of the particles and by the forces between them, `viscosity_by_dissipation` by the power
 //! that fluid and films dissipate, and friction of contacts in the flow, less that of weight and other forces
-//! of the case: without repulsion, and without contacts that correct velocities after the flow, the difference
-//! is an error of discretisation. It is empty where these forces do more than the shear. `viscosity_of_films`, `viscosity_of_contacts`,
-//! `viscosity_of_friction`, and `viscosity_of_repulsion` are the shares of films too thin for the mesh, of
-//! contacts, of their tangential forces alone, and of repulsion in the first; those of contacts are there
-//! where these act in the flow, and in 3D. `particle_pressure` is `-tr S / (D V)`, relative to the mean
-//! pressure of the fluid.
+//! of the case: without repulsion, and without contacts that correct velocities after the flow, the
+//! difference is an error of discretisation. It is empty where these forces do more than the shear.
+//! `viscosity_of_films`,
+//! `viscosity_of_contacts`, `viscosity_of_friction`, and `viscosity_of_repulsion` are the shares of films too
+//! thin for the mesh, of contacts, of their tangential forces alone, and of repulsion in the first; those of
+//! contacts are there where these act in the flow, and in 3D. `particle_pressure` is `-tr S / (D V)`,
+//! relative to the mean pressure of the fluid.
 
 use gluey_motion::MeanStress;
 

@@ -45,7 +45,7 @@ pub(super) struct StepStart<'a, const D: usize> {
 }
 
 /// A prediction with velocities that contacts allow.
-pub(super) struct Found<const D: usize> {
+pub(super) struct ContactPrediction<const D: usize> {
     pub prediction: Prediction<D>,
     /// The part of the step for which there are forces.
     pub part: Part,
@@ -58,7 +58,7 @@ pub(super) fn predicted_in_contact<const D: usize, H: Hydrodynamics<D>>(
     contact: &mut dyn FlowForces<D>,
     now: &Configuration<'_, D>,
     start: StepStart<'_, D>,
-) -> Result<Found<D>, StepError<H::Error>> {
+) -> Result<ContactPrediction<D>, StepError<H::Error>> {
     let (step, time) = (start.step, now.time);
     let flow_failed = |source| StepError::Flow { step, time, source };
     let contact_failed = |source| StepError::Contact { step, time, source };
@@ -80,7 +80,7 @@ pub(super) fn predicted_in_contact<const D: usize, H: Hydrodynamics<D>>(
     let prediction = predicted.map_err(flow_failed)?;
     let (twists, report) = corrected.map_err(contact_failed)?;
     let gaps = GapReport { contacts: report.contact, changes, ..GapReport::default() };
-    Ok(Found { prediction: Prediction { twists, ..prediction }, part, gaps })
+    Ok(ContactPrediction { prediction: Prediction { twists, ..prediction }, part, gaps })
 }
 
 /// The iteration of a step.

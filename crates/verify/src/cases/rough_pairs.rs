@@ -79,7 +79,7 @@ fn methods() -> impl Iterator<Item = &'static Method> + Clone {
 }
 
 /// Forces in radii, viscosity and shear rate, and what else is compared.
-struct Found {
+struct ClosedPair {
     pressing: f64,
     tangential: Vector<3>,
     slip: f64,
@@ -119,7 +119,10 @@ fn largest_normal_force(table: &Table, roughness: f64) -> Result<f64, VerifyErro
 }
 
 /// A pair whose gap is its roughness, in a short step of a run.
-fn solve(method: &Method, [cells, roughness, friction, psi, theta]: [f64; 5]) -> Result<Found, VerifyError> {
+fn solve(
+    method: &Method,
+    [cells, roughness, friction, psi, theta]: [f64; 5],
+) -> Result<ClosedPair, VerifyError> {
     let suspension = suspension(level(RADIUS, cells));
     let [psi, theta] = [psi, theta].map(f64::to_radians);
     let normal = Vector::<3>::new(psi.sin() * theta.cos(), psi.sin() * theta.sin(), psi.cos());
@@ -165,7 +168,7 @@ fn solve(method: &Method, [cells, roughness, friction, psi, theta]: [f64; 5]) ->
     let stress = prediction.stress.ok_or_else(|| VerifyError::NoReference("the stress".to_owned()))?;
     let spin = std::array::from_fn(|d| Dim::<3>::spin_slice(&twists[0].spin)[d]);
     let (pressing, tangential) = (force.pressing() * scale, force.tangential() * scale);
-    Ok(Found { pressing, tangential, slip: force.slip.norm() / RADIUS, spin, stress, flows })
+    Ok(ClosedPair { pressing, tangential, slip: force.slip.norm() / RADIUS, spin, stress, flows })
 }
 
 fn suspension(level: u8) -> Suspension<3> {
