@@ -12,6 +12,31 @@ pub fn viscosity_of_spheres(phi: f64) -> f64 {
     1.0 + 2.5 * phi * (1.0 + s) / (1.0 - phi * (1.0 + s))
 }
 
+/// Relative viscosity `(1 + 1.25 phi / (1 - phi/most))^2` (Eilers 1941, 10.1007/BF01503023).
+pub fn eilers_viscosity(phi: f64, most: f64) -> f64 {
+    (1.0 + 1.25 * phi / (1.0 - phi / most)).powi(2)
+}
+
+/// Relative viscosity `(1 - phi/most)^-2` (Maron and Pierce 1956, 10.1016/0095-8522(56)90023-X).
+pub fn maron_pierce_viscosity(phi: f64, most: f64) -> f64 {
+    (1.0 - phi / most).powi(-2)
+}
+
+/// Relative viscosity of real spheres, `exp(-2.34 phi) / (1 - phi/0.62)^3` (Zarraga, Hill and Leighton 2000,
+/// 10.1122/1.551083).
+pub fn zarraga_viscosity(phi: f64) -> f64 {
+    (-2.34 * phi).exp() / (1.0 - phi / 0.62).powi(3)
+}
+
+/// Relative viscosity of real spheres, `1 + 2.5 phi / (1 - phi/most) + mu(phi) (phi / (most - phi))^2` with `mu
+/// = 0.32 + 0.38 / (1 + 0.005 (phi / (most - phi))^2)` and `most = 0.585` (Boyer, Guazzelli and Pouliquen 2011,
+/// 10.1103/PhysRevLett.107.188301).
+pub fn boyer_viscosity(phi: f64) -> f64 {
+    let most = 0.585;
+    let square = (phi / (most - phi)).powi(2);
+    1.0 + 2.5 * phi / (1.0 - phi / most) + (0.32 + 0.38 / (1.0 + 0.005 * square)) * square
+}
+
 /// Velocity of hard spheres in equilibrium that begin to settle, over that of a single sphere: a polynomial
 /// through results of simulations for fractions up to 0.5.
 pub fn settling_of_spheres(phi: f64) -> f64 {

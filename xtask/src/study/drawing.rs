@@ -5,19 +5,19 @@ use gluey_pictures::{Axis, Canvas, Curve, Stroke, stack};
 
 const FRAME_HEIGHT: f64 = 340.0;
 
-/// Solid lines for what was computed, in colours that stay apart for colour-blind readers; thinner ones lie
-/// on top, so that curves that coincide are all seen.
+/// Solid lines for what was computed, in colours that stay apart for colour-blind readers.
 const COMPUTED: [Stroke; 4] = [
-    Stroke { color: "#0b4f9e", width: 4.2, dashes: None },
-    Stroke { color: "#c8471b", width: 3.0, dashes: None },
+    Stroke { color: "#0b4f9e", width: 1.8, dashes: None },
+    Stroke { color: "#c8471b", width: 1.8, dashes: None },
     Stroke { color: "#1b7f4d", width: 1.8, dashes: None },
-    Stroke { color: "#8a3ea0", width: 1.0, dashes: None },
+    Stroke { color: "#8a3ea0", width: 1.8, dashes: None },
 ];
 /// Thin lines for what is known.
-const KNOWN: [Stroke; 3] = [
+const KNOWN: [Stroke; 4] = [
     Stroke { color: "#111", width: 1.2, dashes: Some("2 2.5") },
     Stroke { color: "#111", width: 1.2, dashes: Some("9 4") },
     Stroke { color: "#111", width: 1.2, dashes: Some("9 3 2 3") },
+    Stroke { color: "#111", width: 1.2, dashes: Some("4 2") },
 ];
 
 /// A quantity with its error, at many places.

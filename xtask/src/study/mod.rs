@@ -5,10 +5,12 @@
 
 mod drawing;
 mod findings;
+mod friction;
 mod page;
 mod point;
 mod reversibility;
 mod settling;
+mod steady;
 mod viscosity;
 
 use std::num::NonZeroUsize;
@@ -28,6 +30,8 @@ use point::{Done, StudyPoint};
 pub enum Name {
     /// Relative viscosity of sheared spheres against their fraction.
     Viscosity,
+    /// Rheology of rough spheres with friction against their fraction.
+    Friction,
     /// Particles that do not come back in an oscillating shear, against its amplitude.
     Reversibility,
     /// Settling velocity of spheres against their fraction.
@@ -54,6 +58,7 @@ impl Name {
     fn study(self) -> Study {
         match self {
             Self::Viscosity => viscosity::STUDY,
+            Self::Friction => friction::STUDY,
             Self::Reversibility => reversibility::STUDY,
             Self::Settling => settling::STUDY,
         }

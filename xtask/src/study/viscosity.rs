@@ -3,12 +3,12 @@
 use std::f64::consts::PI;
 
 use gluey::Tally;
-use gluey_suspension::statistics::{Estimate, mser};
 use gluey_verify::literature::viscosity_of_spheres;
 
 use super::drawing::{StudySeries, curve, draw};
 use super::findings::{Findings, Study};
 use super::point::{Done, StudyPoint};
+use super::steady::steady;
 
 const FILE: &str = "viscosity.toml";
 const LUBRICATION: &str = "lubrication";
@@ -84,20 +84,6 @@ fn with_model(point: StudyPoint, radius: f64) -> StudyPoint {
 /// What is taken of the rheology: viscosity, share of contacts, normal stress differences.
 const COLUMNS: [&str; 4] = ["viscosity", "viscosity_of_contacts", "N1", "N2"];
 
-/// Means and half widths in the steady state, and the strain at which it begins.
-fn steady(done: &Done) -> anyhow::Result<Option<(f64, Vec<Estimate>)>> {
-    let Some(table) = &done.rheology else { return Ok(None) };
-    let skip = mser(table.column("viscosity")?).length;
-    let strain = table.column("strain")?;
-    let mut estimates = Vec::new();
-    for name in COLUMNS {
-        let series = table.column(name)?.get(skip..).unwrap_or(&[]);
-        let Some(estimate) = Estimate::of(series) else { return Ok(None) };
-        estimates.push(estimate);
-    }
-    Ok(strain.get(skip).map(|&begin| (begin, estimates)))
-}
-
 /// Columns of the rheology with a picture, each with its label, in the order in which they are drawn.
 const DRAWN: [(usize, &str, &str); 3] = [
     (2, "first-normal-stress", "*N*_{1} / viscous stress"),
@@ -108,7 +94,7 @@ const DRAWN: [(usize, &str, &str); 3] = [
 fn findings(done: &[Done]) -> anyhow::Result<Findings> {
     let (mut rows, mut drawn) = (Vec::new(), DRAWN.map(|_| MODELS.map(StudySeries::new)));
     for run in done {
-        let Some((begin, estimates)) = steady(run)? else { continue };
+        let Some((begin, estimates)) = steady(run, &COLUMNS)? else { continue };
         let [eta, contacts, n1, n2] = [0, 1, 2, 3].map(|k| &estimates[k]);
         let shown = |x: f64| format!("{x:.4}");
         let smallest = run.report.min_gap_over_a.map_or(String::new(), |gap| format!("{gap:.1e}"));

@@ -230,7 +230,7 @@ fn check_contact(case: &Case, key: &Key, findings: &mut CaseFindings) {
     let is_rough = strategy == Strategy::Rough;
     if is_rough && metric == Metric::Drag {
         let found = format!("\"{metric}\"");
-        let needs = format!("metric = \"{}\"", Metric::Flow);
+        let needs = format!("contact.metric = \"{}\"", Metric::Flow);
         return findings.unfit(key.name("strategy"), format!("\"{strategy}\""), needs, found);
     }
     if metric == Metric::Drag {
