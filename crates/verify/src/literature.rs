@@ -28,8 +28,8 @@ pub fn zarraga_viscosity(phi: f64) -> f64 {
     (-2.34 * phi).exp() / (1.0 - phi / 0.62).powi(3)
 }
 
-/// Relative viscosity of real spheres, `1 + 2.5 phi / (1 - phi/most) + mu q` with `q = (phi / (most - phi))^2`,
-/// `mu = 0.32 + 0.38 / (1 + 0.005 q)` and `most = 0.585` (Boyer, Guazzelli and Pouliquen 2011,
+/// Relative viscosity of real spheres, `1 + 2.5 phi / (1 - phi/most) + mu q` with `most = 0.585`,
+/// `q = (phi / (most - phi))^2` and `mu = 0.32 + 0.38 / (1 + 0.005 q)` (Boyer, Guazzelli and Pouliquen 2011,
 /// 10.1103/PhysRevLett.107.188301).
 pub fn boyer_viscosity(phi: f64) -> f64 {
     let most = 0.585;
