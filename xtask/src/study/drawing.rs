@@ -5,7 +5,7 @@ use gluey_pictures::{Axis, Canvas, Curve, Stroke, stack};
 
 const FRAME_HEIGHT: f64 = 340.0;
 
-/// Solid lines for what was computed, in colours that stay apart for colour-blind readers.
+/// Points with error bars for what was computed, in colours that stay apart for colour-blind readers.
 const COMPUTED: [Stroke; 4] = [
     Stroke { color: "#0b4f9e", width: 1.8, dashes: None },
     Stroke { color: "#c8471b", width: 1.8, dashes: None },
@@ -57,8 +57,8 @@ pub fn draw(
     for (series, stroke) in series.iter().zip(COMPUTED) {
         let is_shown = |point: &&(f64, f64, f64)| !is_logarithmic || point.1 > 0.0;
         let points: Vec<_> = series.points.iter().filter(is_shown).copied().collect();
-        let line = points.iter().map(|&(x, y, _)| (x, y)).collect();
-        curves.push(Curve { label: Some(series.label.clone()), stroke, pieces: vec![line] });
+        let dots = points.iter().map(|&(x, y, _)| vec![(x, y)]).collect();
+        curves.push(Curve { label: Some(series.label.clone()), stroke, pieces: dots });
         let bars = points.iter().filter(|(_, y, error)| *error > 0.0 && (!is_logarithmic || error < y));
         let bars = bars.map(|&(x, y, error)| vec![(x, y - error), (x, y + error)]).collect();
         curves.push(Curve { label: None, stroke, pieces: bars });
