@@ -4,24 +4,27 @@ use gluey::Case;
 
 use crate::runs::{self, beside, case, column, ran};
 
-/// Rough particles that start in contact or nearly, in a box that is sheared.
-fn crowd(dimension: usize, cells_per_radius: f64, rest: &str) -> Case {
-    let (fraction, count) = if dimension == 2 { (0.55, 12) } else { (0.4, 6) };
+/// Twelve rough particles that nearly touch at first, in a box that is sheared; films of discs keep these
+/// farther apart.
+fn crowd(dimension: usize, time: &str) -> Case {
+    let (fraction, seed, roughness, cells) =
+        if dimension == 2 { (0.55, 5, 0.03, 4.0) } else { (0.45, 4, ROUGHNESS, 1.0) };
     case(&format!(
         "name = \"r\"\ndimension = {dimension}\ndomain = {{ boundary = \"sheared\" }}\n\
-         suspension = {{ volume_fraction = {fraction}, count = {count}, seed = 5, min_gap = 0.006 }}\n{rest}\n\
-         [flow.mesh]\ncells_per_radius = {cells_per_radius:?}\ncoarsest_level = 2\n"
+         suspension = {{ volume_fraction = {fraction}, count = 12, seed = {seed}, min_gap = {} }}\n\
+         contact = {{ strategy = \"rough\", roughness = {roughness} }}\ntime = {{ step = 0.02, {time} }}\n\
+         [flow.mesh]\ncells_per_radius = {cells:?}\ncoarsest_level = 2\n",
+        1.2 * roughness
     ))
 }
 
-const ROUGH: &str = "contact = { strategy = \"rough\", friction = 0.5, roughness = 0.005 }\n\
-                     time = { step = 0.02, end = 0.4 }";
+const ROUGHNESS: f64 = 0.005;
 
 /// No gap is below the roughness, contacts carry a part of the stress, and the power of the shear is that
 /// which fluid, films and friction dissipate.
-fn crowds_keep_their_roughness_and_their_power<const D: usize>(cells_per_radius: f64, most: f64) {
+fn crowds_keep_their_roughness_and_their_power<const D: usize>(end: f64, roughness: f64, most: f64) {
     let names = ["viscosity", "viscosity_by_dissipation", "viscosity_of_contacts", "viscosity_of_friction"];
-    let case = crowd(D, cells_per_radius, ROUGH);
+    let case = crowd(D, &format!("end = {end}"));
     let (columns, gaps, flows) = ran(&case, |csv| {
         let columns = names.map(|name| column(&beside(csv, "rheology"), name));
         (columns, column(csv, "min_gap_over_a"), column(&beside(csv, "solver"), "flows_in_contact"))
@@ -35,31 +38,30 @@ fn crowds_keep_their_roughness_and_their_power<const D: usize>(cells_per_radius:
     );
     println!("flows: {flows:?}");
     assert!(miss < most, "{miss}");
-    assert!(share > 0.3 && held.abs() > 1e-3, "{share} {held}");
-    assert!(smallest > 0.005 - 1e-9, "{smallest}");
+    assert!(share > 0.05 && held.abs() > 0.02, "{share} {held}");
+    assert!(smallest > roughness - 1e-9, "{smallest}");
     assert!(flows.iter().any(|flows| *flows > 1.0));
 }
 
 #[test]
 fn discs_keep_their_roughness_and_their_power() {
-    crowds_keep_their_roughness_and_their_power::<2>(4.0, 0.02);
+    crowds_keep_their_roughness_and_their_power::<2>(1.2, 0.03, 0.0075);
 }
 
+/// At 1.7 cells in a radius the power of this configuration is off by 8.6 % before any of them touch.
 #[test]
 fn spheres_keep_their_roughness_and_their_power() {
-    crowds_keep_their_roughness_and_their_power::<3>(1.6, 0.06);
+    crowds_keep_their_roughness_and_their_power::<3>(0.3, ROUGHNESS, 0.11);
 }
 
 #[test]
 fn runs_resume_bit_by_bit() {
-    let rest = "contact = { strategy = \"rough\" }\ntime = { step = 0.02, end = 0.3, reverse_at = 0.22 }";
-    runs::resumes_bit_by_bit(&crowd(2, 3.0, rest), 8, &["rheology"]);
+    runs::resumes_bit_by_bit(&crowd(3, "end = 0.22, reverse_at = 0.18"), 7, &["rheology"]);
 }
 
 #[test]
 fn threads_do_not_matter() {
-    let rest = "contact = { strategy = \"rough\" }\ntime = { step = 0.02, end = 0.2 }";
-    runs::threads_give_the_same_bits(&crowd(3, 1.0, rest), &["rheology"]);
+    runs::threads_give_the_same_bits(&crowd(3, "end = 0.14"), &["rheology"]);
 }
 
 /// A sphere between walls that another one pushes against a wall, held ones beside it: all that forces of
@@ -88,7 +90,7 @@ fn gluey_contact_in_the_flow_is_reversible() {
     let end_of = |strategy: &str, step: f64| {
         let rest = format!(
             "contact = {{ strategy = \"{strategy}\", metric = \"flow\" }}\n\
-             time = {{ step = {step}, end = 0.8, reverse_at = 0.4 }}\n\
+             time = {{ step = {step}, end = 3.2, reverse_at = 1.6 }}\n\
              flow = {{ lubrication = \"none\", mesh = {{ cells_per_radius = 3.0, coarsest_level = 2 }} }}"
         );
         let case = case(&format!(
@@ -100,8 +102,8 @@ fn gluey_contact_in_the_flow_is_reversible() {
             runs::rms_distance(&rows[0], &rows[rows.len() - 1])
         })
     };
-    let [coarse, fine] = [0.04, 0.02].map(|step| end_of("gluey", step));
+    let [coarse, fine] = [0.04, 0.01].map(|step| end_of("gluey", step));
     let inelastic = end_of("inelastic", 0.02);
     println!("gluey {coarse:.2e} {fine:.2e}, inelastic {inelastic:.2e}");
-    assert!(fine < 0.5 * coarse && fine < 0.2 * inelastic, "{coarse} {fine} {inelastic}");
+    assert!(fine < 0.3 * coarse && fine < 0.05 * inelastic, "{coarse} {fine} {inelastic}");
 }

@@ -9,6 +9,10 @@ use serde::{Deserialize, Serialize};
 
 use super::names::{Metric, Strategy, schema_of_names};
 
+/// Change of the forces of gluey contacts by another flow at which they are those of the step: what is wrong
+/// with a force stays in the memory.
+const GLUEY_TOLERANCE: f64 = 1e-3;
+
 /// Contact.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
@@ -32,10 +36,10 @@ pub struct ContactSpec {
     /// Default: 0.
     #[schemars(range(min = 0))]
     pub friction_load: f64,
-    /// Change of the forces of `rough` contacts over their size, by their power, at which a step needs no
-    /// other flow with them. Unit: none. Default: 0.05.
+    /// Change of contact forces that act in the flow over their size, by their power, at which a step needs
+    /// no other flow with them. Unit: none. Default: 0.05, for `gluey`, which remembers forces, 1e-3.
     #[schemars(extend("exclusiveMinimum" = 0), range(max = 1))]
-    pub flow_tolerance: f64,
+    pub flow_tolerance: Option<f64>,
     /// Whether the constraint is linearised again at the end of the step, until gaps are >= 0 to round-off.
     /// Default: true.
     pub exact_gap: bool,
@@ -63,6 +67,15 @@ pub struct ContactSpec {
 }
 
 impl ContactSpec {
+    /// The change of forces at which a step needs no other flow, by the strategy unless the case says it.
+    pub fn flow_tolerance(&self) -> f64 {
+        let usual = match self.strategy {
+            Strategy::Gluey => GLUEY_TOLERANCE,
+            _ => FlowContactParams::FLOW_TOLERANCE,
+        };
+        self.flow_tolerance.unwrap_or(usual)
+    }
+
     /// Whether the forces of contacts act in the flow, by the strategy unless the case says so.
     pub fn metric(&self) -> Metric {
         let usual = if self.strategy == Strategy::Rough { Metric::Flow } else { Metric::Drag };
@@ -108,7 +121,7 @@ impl Default for ContactSpec {
             roughness: 5e-3,
             friction: 0.5,
             friction_load: 0.0,
-            flow_tolerance: FlowContactParams::FLOW_TOLERANCE,
+            flow_tolerance: None,
             exact_gap: true,
             memory: Memory::Consistent,
             gamma_min,

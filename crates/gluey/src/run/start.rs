@@ -16,7 +16,7 @@ where
 {
     let (scheme, dt) = (case.time.scheme, case.time.step);
     let mut simulation = Simulation::new(case.start(), scheme, dt, hydrodynamics, contact);
-    let iteration = FlowIteration { tolerance: case.contact.flow_tolerance, ..FlowIteration::default() };
+    let iteration = FlowIteration { tolerance: case.contact.flow_tolerance(), ..FlowIteration::default() };
     simulation = simulation.halving(case.time.halvings).iterating(iteration);
     if case.has_forces() {
         simulation = simulation.under_forces();

@@ -6,8 +6,9 @@ use super::Suspension;
 use crate::error::StokesError;
 use crate::film::{self, Lubrication, NearMobility};
 
-/// Without corrections films resist like those of this thickness, in cells: in 3D they are widened to it.
-const THINNEST_SEEN: f64 = 0.6;
+/// Without corrections films resist like those of this thickness at least, in cells: in 3D they are widened
+/// to it, in 2D the mesh has too little of thinner ones.
+const THINNEST_SEEN: [f64; 2] = [0.1, 0.6];
 
 impl<const D: usize> Suspension<D> {
     /// Edge of the cells at surfaces.
@@ -30,7 +31,7 @@ impl<const D: usize> Suspension<D> {
         let largest = self.radii.iter().copied().fold(0.0, f64::max);
         let thinnest = match self.lubrication {
             Lubrication::Deficit => 0.0,
-            Lubrication::None => THINNEST_SEEN * self.cell_size(),
+            Lubrication::None => THINNEST_SEEN[D - 2] * self.cell_size(),
         };
         let mut films = film::films(&self.balls(configuration), &self.domain, largest);
         films.iter_mut().for_each(|film| film.gap = film.gap.max(thinnest));
