@@ -31,14 +31,15 @@ fn crowds_keep_their_roughness_and_their_power<const D: usize>(end: f64, roughne
     });
     let [viscosity, by_power, contacts, friction] = &columns;
     let miss = viscosity.iter().zip(by_power).map(|(a, b)| (a / b - 1.0).abs()).fold(0.0, f64::max);
-    let [share, held] = [contacts, friction].map(|share| share.iter().copied().fold(0.0, f64::max));
+    let [share, held] =
+        [contacts, friction].map(|share| share.iter().fold(0.0f64, |most, share| most.max(share.abs())));
     let smallest = gaps.iter().copied().fold(f64::INFINITY, f64::min);
     println!(
         "{D}D: miss {miss:.1e}, contacts up to {share:.2}, friction {held:.3}, smallest gap {smallest:.9} a"
     );
     println!("flows: {flows:?}");
     assert!(miss < most, "{miss}");
-    assert!(share > 0.05 && held.abs() > 0.02, "{share} {held}");
+    assert!(share > 0.6 && held > 5e-3, "{share} {held}");
     assert!(smallest > roughness - 1e-9, "{smallest}");
     assert!(flows.iter().any(|flows| *flows > 1.0));
 }
