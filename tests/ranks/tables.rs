@@ -106,7 +106,7 @@ fn forces_of_rough_contacts_act_on_all_ranks() {
     let case = case(
         "name = \"r\"\ndimension = 3\ndomain = { boundary = \"sheared\" }\n\
          particles = [{ position = [0.4, 0.58, 0.5], radius = 0.12 },\n\
-                      { position = [0.568, 0.4095, 0.5], radius = 0.12 },\n\
+                      { position = [0.5695, 0.4085, 0.5], radius = 0.12 },\n\
                       { position = [0.2, 0.2, 0.3], radius = 0.1 }]\n\
          time = { step = 0.05, end = 0.2 }\ncontact = { strategy = \"rough\", flow_tolerance = 1e-4 }\n\
          [flow]\nsolver = \"multigrid\"\ntolerance = 1e-11\n\
