@@ -2,8 +2,7 @@
 //!
 //! Each particle has the drag that it has alone, and each film thinner than the radius of the smaller of its
 //! two all that lubrication theory knows of it: as the deficit of a mesh that resolves films from that
-//! thickness on. Of what the flow does with forces between near particles this is nearly all: eigenvalues of
-//! the one in the metric of the other lie between 0.85 and 1.25.
+//! thickness on. Of what the flow does with forces between near particles this is nearly all.
 
 use gluey_geom::{Dim, Twist, Vector, Wrench};
 use gluey_linalg::DirectError;

@@ -102,9 +102,9 @@ impl<const D: usize> FlowsOfStep<'_, D> {
         let all = added(&all, of_contacts);
         let with_all = Conditions { bodies: Given::Wrenches(&all), ..*conditions };
         let lift = problem.lift(conditions.boundary);
-        let effort = SolveEffort::of([&first, &second.flow]);
-        let mut flow = flow_of(problem, &with_all, &lift, &mut both, Vec::new(), &effort)?;
-        flow.times = watch.times();
+        let mut flow = flow_of(problem, &with_all, &lift, &mut both, Vec::new(), &SolveEffort::default())?;
+        [&first, &second.flow].into_iter().for_each(|part| flow.count_effort_of(part));
+        (flow.residual, flow.times) = (first.residual.max(second.flow.residual), watch.times());
         self.ready = Some(ready);
         Ok(flow)
     }
@@ -141,18 +141,5 @@ impl<const D: usize> FlowsOfStep<'_, D> {
         *x = adapted.x;
         self.solver.keep_for_next(problem, x, &adapted.flow.pressure, before.take());
         Ok(adapted.flow)
-    }
-}
-
-impl SolveEffort {
-    /// That of two flows together, with the larger residual.
-    fn of<const D: usize>([first, second]: [&Flow<D>; 2]) -> Self {
-        Self {
-            solve_count: first.solve_count + second.solve_count,
-            iteration_count: first.iteration_count + second.iteration_count,
-            residual: first.residual.max(second.residual),
-            fine_operator_applications: first.fine_operator_applications + second.fine_operator_applications,
-            traffic: first.solve_traffic + second.solve_traffic,
-        }
     }
 }
