@@ -253,7 +253,10 @@ where
             return self.hydrodynamics.predict(&now).map_err(|source| StepError::Flow { step, time, source });
         };
         let found = predicted_in_contact(&mut self.hydrodynamics, contact, &now, start)?;
-        (self.part, self.gaps) = (found.part, found.gaps);
+        self.part = found.part;
+        if self.part.is_first() {
+            self.gaps = found.gaps;
+        }
         Ok(found.prediction)
     }
 

@@ -58,6 +58,10 @@ impl FlowContactParams {
     /// The usual change of forces by another flow of the step, over their size, by the power that they have,
     /// at which they are those of the step.
     pub const FLOW_TOLERANCE: f64 = 0.05;
+    /// The usual roughness, in mean radii.
+    pub const ROUGHNESS: f64 = 5e-3;
+    /// The usual coefficient of friction.
+    pub const FRICTION: f64 = 0.5;
 
     /// Smallest gap, in mean radii.
     pub(super) fn roughness(&self) -> f64 {
@@ -69,11 +73,10 @@ impl FlowContactParams {
 }
 
 impl Default for FlowContactParams {
-    /// A roughness of 0.005 and a coefficient of friction of 0.5.
     fn default() -> Self {
         Self {
-            law: NormalLaw::Rough { roughness: 5e-3 },
-            friction: Friction { coefficient: 0.5, load: 0.0 },
+            law: NormalLaw::Rough { roughness: Self::ROUGHNESS },
+            friction: Friction { coefficient: Self::FRICTION, load: 0.0 },
             viscosity: 1.0,
             tolerance: 1e-10,
             iteration_limit: 5000,

@@ -118,8 +118,8 @@ impl Default for ContactSpec {
         Self {
             strategy: Strategy::default(),
             metric: None,
-            roughness: 5e-3,
-            friction: 0.5,
+            roughness: FlowContactParams::ROUGHNESS,
+            friction: FlowContactParams::FRICTION,
             friction_load: 0.0,
             flow_tolerance: None,
             exact_gap: true,
