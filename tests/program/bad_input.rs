@@ -312,7 +312,12 @@ fn names_that_are_not_known() {
     refused_line(
         18,
         "strategy = \"glue\"",
-        &["contact.strategy", "expected `none` or `velocity-correction` or `inelastic` or `gluey` or `rough`", near, all],
+        &[
+            "contact.strategy",
+            "expected `none` or `velocity-correction` or `inelastic` or `gluey` or `rough`",
+            near,
+            all,
+        ],
     );
     refused_line(22, "formulation = \"rigid\"", &["flow.formulation", "\"paper\", \"unfitted\""]);
     refused_line(16, "scheme = \"rk4\"", &["time.scheme", "\"euler\", \"adams-bashforth-2\""]);
@@ -410,7 +415,10 @@ fn arguments_that_make_no_sense() {
     let folder = TempDir::new().expect("a folder");
     fs::write(folder.path().join("case.toml"), GOOD).expect("a file");
     for (arguments, expected) in [
-        (["--strategy", "glue"], "expected `none` or `velocity-correction` or `inelastic` or `gluey` or `rough`"),
+        (
+            ["--strategy", "glue"],
+            "expected `none` or `velocity-correction` or `inelastic` or `gluey` or `rough`",
+        ),
         (["--formulation", "soft"], "`soft` is not a known formulation"),
         (["--vtk", "0"], "must be at least 1"),
         (["--checkpoint-every", "often"], "must be a whole number"),
