@@ -3,9 +3,10 @@
 use std::f64::consts::PI;
 
 use gluey::Case;
+use gluey_contact::Repulsion;
 use gluey_geom::Vector;
 use gluey_motion::approach_mobility;
-use gluey_suspension::{Container, Repulsion, for_each_pair};
+use gluey_suspension::{Container, for_each_pair};
 
 use crate::runs::{self, beside, case, centers, column, ran};
 

@@ -65,6 +65,7 @@ pub mod part;
 mod projection;
 mod push_apart;
 mod record;
+mod repulsion;
 mod rows;
 #[cfg(any(feature = "dim2", feature = "dim3"))]
 pub mod shape;
@@ -87,6 +88,7 @@ pub use model::{
 pub use network::{Cluster, Clusters, ContactArm, ContactNetwork, Coordination};
 pub use pair_contact::PairContact;
 pub use params::{ContactLaw, ContactParams, GammaUpdate, SolverKind, UnknownName};
+pub use repulsion::Repulsion;
 
 /// The examples of the README.
 #[cfg(doctest)]

@@ -37,6 +37,8 @@ pub struct ContactState {
     pub pairs: Vec<PairState>,
     /// Forces of contacts that act in the flow.
     pub in_flow: Vec<ForceState>,
+    /// Forces by which pairs repelled each other in the last step; unit: that of the mobility.
+    pub repelled: Vec<(PairKey, f64)>,
 }
 
 /// Force of a contact that acts in the flow, with the line of centres that it belongs to; in 2D the third
@@ -82,6 +84,11 @@ impl ContactState {
         if let Some(&ForceState { pair, force, .. }) = self.in_flow.iter().find(|state| !is_finite(state)) {
             return Err(MemoryError { pair, gamma: 0.0, lambda: force.iter().sum() });
         }
+        if let Some(&(pair, lambda)) = self.repelled.iter().find(|(_, force)| !force.is_finite()) {
+            return Err(MemoryError { pair, gamma: 0.0, lambda });
+        }
+        self.repelled.sort_unstable_by_key(|(pair, _)| *pair);
+        self.repelled.dedup_by_key(|(pair, _)| *pair);
         self.in_flow.sort_unstable_by_key(|state| state.pair);
         self.in_flow.dedup_by_key(|state| state.pair);
         self.pairs.retain(|state| state.gamma < 0.0 || state.lambda != 0.0);

@@ -5,7 +5,7 @@ use gluey_geom::{Matrix, Pose, Twist, Vector, Wrench};
 use serde::{Deserialize, Serialize};
 
 use crate::projection::Effort;
-use crate::{ContactError, ContactState, Domain, MemoryError, PairKey, TwistMobility, Wall};
+use crate::{ContactError, ContactState, Domain, MemoryError, PairKey, Repulsion, TwistMobility, Wall};
 
 /// The step `x^{n+1} = x^n + c u^n + drift` whose velocities are to be corrected. One entry per particle.
 #[derive(Clone, Copy, Debug)]
@@ -89,11 +89,18 @@ pub trait FlowForces<const D: usize> {
     /// Tells the rate by which velocities and forces count now, over that by which the critical load does.
     fn set_rate(&mut self, rate: f64);
 
+    /// Lets pairs repel each other from now on; the flow of a step has their forces at its beginning.
+    fn set_repulsion(&mut self, law: Repulsion);
+
     /// Begins a step with the forces of the last one, turned with the lines of centres.
     ///
     /// # Errors
     /// Those of pairs that are not there.
     fn begin(&mut self, step: &BodyStep<'_, D>) -> Result<(), ContactError>;
+
+    /// Whether velocities change their sign with the flow: not where rough surfaces push each other, which do
+    /// not pull.
+    fn is_reversible(&self) -> bool;
 
     /// The forces, sorted by pair.
     fn forces(&self) -> &[ContactForce<D>];

@@ -6,8 +6,6 @@ use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
-use gluey_contact::FilmError;
-
 use crate::case::{Case, IdleKey};
 use crate::number_text::shown;
 use crate::output::solver_log::SolverRow;
@@ -109,7 +107,7 @@ pub enum Notice {
         /// How many parts.
         parts: usize,
         /// Why the whole could not be done.
-        reason: Option<FilmError>,
+        reason: Option<String>,
     },
     /// Penalties at surfaces were changed, for the first time in the run.
     ChangedPenalties {
@@ -144,7 +142,7 @@ impl Notice {
     pub(crate) fn of_first(before: &Tally, after: &Tally, row: &SolverRow<'_>) -> Vec<Self> {
         let (step, time) = (row.step, row.time);
         let halved = (before.halved_steps == 0 && after.halved_steps > 0).then(|| {
-            let (parts, reason) = (row.motion.parts, row.motion.refused);
+            let (parts, reason) = (row.motion.parts, row.motion.refused.clone());
             Self::HalvedStep { step, time, parts, reason }
         });
         let changed = !before.has_changed_penalties() && after.has_changed_penalties();
@@ -191,7 +189,7 @@ impl fmt::Display for Notice {
                 write!(f, "{}: no checkpoint of the last good step: {reason}", path.display())
             }
             Self::HalvedStep { step, time, parts, reason } => {
-                let why = reason.map_or_else(String::new, |reason| format!(": {reason}"));
+                let why = reason.as_ref().map_or_else(String::new, |reason| format!(": {reason}"));
                 write!(
                     f,
                     "step {step} (t = {}) was done in {parts} parts{why}; such steps are counted in the column `parts` \

@@ -1,21 +1,19 @@
 //! The time loop, one step at a time: predict, correct for contact, integrate.
 
 mod error;
+mod films;
 mod in_contact;
 mod part;
 mod repelling;
 mod state;
 mod strain_clock;
 
-use gluey_contact::{
-    Contact, ContactModel, Domain, FilmError, FilmMemory, FilmReport, GapReport, film_reach,
-};
+use gluey_contact::{Contact, ContactModel, Domain, FilmMemory, GapReport, Repulsion};
 use gluey_geom::{Dim, Matrix, Particle, Twist};
 use gluey_motion::{
     Configuration, Fields, FlowStatistics, Holding, Hydrodynamics, Integrator, MeanStress, NoForces,
     Prediction, Scheme,
 };
-use gluey_suspension::Repulsion;
 
 use crate::phases::PhaseTable;
 use crate::tally::StepMotion;
@@ -143,7 +141,8 @@ where
 
     /// The same with particles that repel each other, their images and the walls of `surroundings`.
     #[must_use]
-    pub fn repelling(self, law: Repulsion, surroundings: Domain<D>) -> Self {
+    pub fn repelling(mut self, law: Repulsion, surroundings: Domain<D>) -> Self {
+        self.contact.in_flow().into_iter().for_each(|contact| contact.set_repulsion(law));
         Self { repelling: Some(Repelling::new(law, surroundings)), has_forces: true, ..self }
     }
 
@@ -254,6 +253,7 @@ where
         };
         let found = predicted_in_contact(&mut self.hydrodynamics, contact, &now, start)?;
         self.part = found.part;
+        self.motion.refused = found.refused.or(self.motion.refused.take());
         if self.part.is_first() {
             self.gaps = found.gaps;
         }
@@ -267,7 +267,7 @@ where
             contact.finish();
             return Ok(());
         }
-        let films = self.open_films()?;
+        let films = self.keep_apart()?;
         let (step, time, dt) = (self.step, self.time(), self.part_length());
         if let Some(Sliding { height, .. }) = self.sliding {
             self.contact.set_sliding(self.strain * height, self.sliding_rate() * height * dt);
@@ -286,30 +286,6 @@ where
         }
         self.gaps.films.largest_push = self.gaps.films.largest_push.max(films.largest_push);
         Ok(())
-    }
-
-    fn open_films(&mut self) -> Result<FilmReport, StepError<H::Error>> {
-        loop {
-            let source = match self.try_to_open_films() {
-                Ok(report) => return Ok(report),
-                Err(error) => error,
-            };
-            let half = self.part.halved(self.most_halvings).filter(|_| !source.is_given());
-            let (step, time, length) = (self.step, self.time(), self.part_length());
-            self.part = half.ok_or(StepError::Film { step, time, length, source })?;
-            self.motion.refused = Some(source);
-        }
-    }
-
-    fn try_to_open_films(&mut self) -> Result<FilmReport, FilmError> {
-        let (dt, rate, time) = (self.part_length(), self.sliding_rate(), self.time());
-        let (shear_factor, strain) = (self.shear_factor(), self.strain);
-        let Self { integrator, particles, hydrodynamics, films, prediction, phases, .. } = self;
-        integrator.with_step(dt, particles, |step| {
-            let now = Configuration { shear_factor, strain, ..Configuration::at(time, particles) };
-            let near = hydrodynamics.films(&now, film_reach(step, &prediction.twists, rate));
-            phases.time("motion", || films.open(step, &near, &mut prediction.twists))
-        })
     }
 
     /// Moves the particles with the corrected velocities. Where these are for a part of the step only, the
@@ -341,11 +317,12 @@ where
     /// Reverses the shear from the next step on.
     ///
     /// In Stokes flow all velocities change sign at once, and so does the history of the integrator; what
-    /// contacts remember of the impulse between particles stays. Where forces act that stay as they are,
-    /// velocities are others, and the integrator begins anew.
+    /// contacts remember of the impulse between particles stays. Where forces act that stay as they are, or
+    /// rough surfaces push each other, velocities are others, and the integrator begins anew.
     pub fn reverse_shear(&mut self) {
         self.reversed = !self.reversed;
-        match self.has_forces {
+        let is_reversible = self.contact.in_flow().is_none_or(|contact| contact.is_reversible());
+        match self.has_forces || !is_reversible {
             true => self.integrator.restart(),
             false => self.integrator.reverse(),
         }
@@ -447,6 +424,7 @@ where
             particles: self.particles.clone(),
             integrator: self.integrator.clone(),
             films: self.films.clone(),
+            repelling: self.repelling.as_ref().map(Repelling::checkpoint).unwrap_or_default(),
             contact: self.contact.checkpoint(),
             hydrodynamics: self.hydrodynamics.checkpoint()?,
         })
@@ -464,6 +442,7 @@ where
         }
         self.hydrodynamics.resume(&state.hydrodynamics)?;
         self.contact.resume(state.contact)?;
+        self.repelling.as_mut().map_or(Ok(()), |repelling| repelling.resume(state.repelling))?;
         self.step = state.step;
         self.reversed = state.reversed;
         self.strain = state.strain;

@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use gluey_contact::{FilmError, FilmReport};
+use gluey_contact::FilmReport;
 use gluey_motion::FlowStatistics;
 use serde::{Deserialize, Serialize};
 
@@ -11,21 +11,22 @@ use serde::{Deserialize, Serialize};
 const SMALL_PUSH: f64 = 0.01;
 
 /// The motion of the particles in a step.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct StepMotion {
     /// Parts in which the step was done; 0 before it was.
     pub parts: usize,
     /// The shortest of them, as a share of the step.
     pub shortest: f64,
     /// Why the step was halved, where it was: what was found at the shortest length that could not be done.
-    pub refused: Option<FilmError>,
+    pub refused: Option<String>,
 }
 
 /// Steps that were halved, films that closed, penalties that were changed.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct Tally {
-    /// Steps that were done in parts, because films could not be kept open in the whole.
+    /// Steps that were done in parts, because films could not be kept open in the whole, or no forces of
+    /// contacts were found.
     pub halved_steps: usize,
     /// The shortest part, as a share of a step; 1 where none was halved, 0 before any.
     pub shortest_part: f64,

@@ -44,7 +44,7 @@ pub mod structure;
 
 pub use container::{Container, ball_volume};
 pub use pairs::{NearPair, for_each_pair};
-pub use repulsion::{Repelled, Repulsion};
+pub use repulsion::{Repelled, repelled};
 
 /// The examples of the README.
 #[cfg(doctest)]

@@ -9,6 +9,9 @@
 //! forces with which the mobility keeps pairs apart; where these are others, a flow with them comes next.
 //! What the mobility lacks of the flow shrinks the change each time. From the third flow on Anderson's
 //! acceleration helps.
+//!
+//! Pairs may repel each other besides. The flow has the repulsion of the beginning of the step; what that of
+//! the step is beyond it acts in the mobility alone, and so do steps that are as long as they like.
 
 mod anderson;
 mod near;
@@ -26,12 +29,12 @@ use crate::neighbours::NeighbourList;
 use crate::pair_contact::Centers;
 use crate::{
     BodyStep, Contact, ContactError, ContactForce, ContactModel, ContactReport, ContactState, Domain,
-    FlowContactReport, FlowForces, ForceState, LoneDrag, MemoryError, PairKey, PairState, Partner,
+    FlowContactReport, FlowForces, ForceState, LoneDrag, MemoryError, PairKey, PairState, Partner, Repulsion,
     StepGeometry, TwistMobility,
 };
 use anderson::Anderson;
 use near::{KnownForce, NearPairs};
-use solve::Outcome;
+use solve::{Outcome, PairForce};
 use touch::Touch;
 
 pub use params::{FlowContactParams, Friction, NormalLaw};
@@ -54,6 +57,9 @@ pub struct FlowContact<const D: usize> {
     neighbours: NeighbourList<D>,
     centers: Centers<D>,
     forces: Vec<ContactForce<D>>,
+    repulsion: Option<Repulsion>,
+    /// Forces by which pairs repelled each other in the last step, and in that of the last correction, sorted.
+    repelled: [Vec<(PairKey, f64)>; 2],
     /// Memory of smooth surfaces after the last step.
     memory: ContactState,
     /// The rule by which that changes in the step of the last correction.
@@ -76,6 +82,8 @@ impl<const D: usize> FlowContact<D> {
             neighbours: NeighbourList::default(),
             centers: Centers::default(),
             forces: Vec::new(),
+            repulsion: None,
+            repelled: Default::default(),
             memory: ContactState::default(),
             rule: None,
             contacts: Vec::new(),
@@ -114,6 +122,9 @@ impl<const D: usize> FlowContact<D> {
             let along = self.walls_along.get(wall as usize).copied().unwrap_or_else(Vector::zeros);
             touch.slide += along * self.shear_factor;
         }
+        if self.params.law == NormalLaw::None {
+            touch.floor = f64::NEG_INFINITY;
+        }
         Ok(touch)
     }
 
@@ -146,10 +157,10 @@ impl<const D: usize> FlowContact<D> {
     ) -> Result<(NearPairs<D>, Outcome<D>), ContactError> {
         validate(geometry, free, &self.domain)?;
         let moves = step.moves(free);
-        self.neighbours.margin = 0.5 * (self.params.roughness() + SPARE);
+        self.neighbours.margin = self.margin(step.radii);
         self.neighbours.begin(geometry, &self.domain, &moves)?;
         self.rule = match &self.params.law {
-            NormalLaw::Rough { .. } => None,
+            NormalLaw::Rough { .. } | NormalLaw::None => None,
             NormalLaw::Smooth(law) => Some(GammaRule::new(law, step.velocity_weight, step.dt)),
         };
         let mut known = self.known_forces();
@@ -167,15 +178,34 @@ impl<const D: usize> FlowContact<D> {
         }
     }
 
+    /// How far pairs are known, over the sum of their radii.
+    fn margin(&self, radii: &[f64]) -> f64 {
+        let of_contact = 0.5 * (self.params.roughness() + SPARE);
+        let smallest = radii.iter().copied().fold(f64::INFINITY, f64::min);
+        // Walls have no radius.
+        let share = if self.domain.walls.is_empty() { 0.5 } else { 1.0 };
+        self.repulsion.map_or(of_contact, |law| of_contact.max(share * law.reach() / smallest))
+    }
+
     /// The pairs with a force or a memory, sorted.
     fn known_forces(&self) -> Vec<KnownForce<D>> {
-        let forces = self.forces.iter().map(|force| KnownForce { pair: force.pair, force: force.force });
-        let has_force = |pair| self.forces.binary_search_by_key(&pair, |force| force.pair).is_ok();
-        let remembered = self.memory.pairs.iter().filter(|state| !has_force(state.pair));
-        let remembered = remembered.map(|state| KnownForce { pair: state.pair, force: Vector::zeros() });
-        let mut known: Vec<_> = forces.chain(remembered).collect();
-        known.sort_unstable_by_key(|known| known.pair);
-        known
+        let of_contact = |force: &ContactForce<D>| (force.pair, force.force);
+        let remembered = self.memory.pairs.iter().map(|state| state.pair);
+        let remembered = remembered.chain(self.repelled[0].iter().map(|(pair, _)| *pair));
+        let forces = self.forces.iter().map(of_contact);
+        let mut known: Vec<_> = forces.chain(remembered.map(|pair| (pair, Vector::zeros()))).collect();
+        // Stable: forces come first.
+        known.sort_by_key(|(pair, _)| *pair);
+        known.dedup_by_key(|(pair, _)| *pair);
+        let force = |(pair, force)| KnownForce { pair, force: PairForce::of_contact(force) };
+        known.into_iter().map(force).collect()
+    }
+
+    /// The force by which a pair repelled each other in the last step.
+    fn repelled(&self, pair: PairKey) -> f64 {
+        let [before, _] = &self.repelled;
+        let place = before.binary_search_by_key(&pair, |(pair, _)| *pair);
+        place.map_or(0.0, |k| before[k].1)
     }
 
     /// The candidates of the search and the pairs with known forces, sorted.
@@ -197,8 +227,12 @@ impl<const D: usize> FlowContact<D> {
                 let PairState { gamma, lambda, .. } = self.memory.get(pair);
                 touch.least = rule.floor(gamma, lambda) * self.unit();
             }
+            if let Some(law) = self.repulsion {
+                touch.repel(law, self.repelled(pair), self.rate, step);
+            }
             let place = known.binary_search_by_key(&pair, |known| known.pair);
-            near.forces.push(place.map_or(Vector::zeros(), |k| known[k].force));
+            let none = PairForce::of_contact(Vector::zeros());
+            near.forces.push(place.map_or(none, |k| known[k].force));
             near.takes_part.push(place.is_ok() && touch.can_yield());
             near.touches.push(touch);
         }
@@ -217,11 +251,16 @@ impl<const D: usize> FlowContact<D> {
         let mut report = FlowContactReport { contact, change: 0.0 };
         let (mut change, mut size, mut forces) = (0.0, 0.0, Vec::new());
         let friction = self.params.friction;
-        for (touch, force) in near.parts() {
-            let gap = touch.gap_after(step, &outcome.twists);
-            report.contact.count_pair(gap, touch.normal.dot(force), || touch.pair);
+        let mut repelled = Vec::new();
+        for (touch, PairForce { contact: force, excess }) in near.parts() {
+            repelled.extend(touch.repulsion.map(|law| (touch.pair, law.now + excess)));
             let before = self.forces.binary_search_by_key(&touch.pair, |before| before.pair);
             let before = before.map_or(Vector::zeros(), |k| self.forces[k].force);
+            if touch.repulsion.is_some() && force.amax().max(before.amax()) == 0.0 {
+                continue;
+            }
+            let gap = touch.gap_after(step, &outcome.twists);
+            report.contact.count_pair(gap, touch.normal.dot(force), || touch.pair);
             change += touch.power(&(force - before));
             size += touch.power(force).max(touch.power(&before));
             let (most, held) =
@@ -235,6 +274,7 @@ impl<const D: usize> FlowContact<D> {
         }
         report.change = if change > 0.0 { (change / size).sqrt() } else { 0.0 };
         self.forces = forces;
+        self.repelled[1] = repelled;
         report
     }
 }
@@ -247,6 +287,10 @@ impl<const D: usize> FlowForces<D> for FlowContact<D> {
 
     fn set_rate(&mut self, rate: f64) {
         self.rate = rate;
+    }
+
+    fn set_repulsion(&mut self, law: Repulsion) {
+        self.repulsion = Some(law);
     }
 
     fn begin(&mut self, step: &BodyStep<'_, D>) -> Result<(), ContactError> {
@@ -266,6 +310,10 @@ impl<const D: usize> FlowForces<D> for FlowContact<D> {
         });
         self.forces = turned.collect::<Result<_, ContactError>>()?;
         Ok(())
+    }
+
+    fn is_reversible(&self) -> bool {
+        self.forces.is_empty() || matches!(self.params.law, NormalLaw::Smooth(_))
     }
 
     fn forces(&self) -> &[ContactForce<D>] {
@@ -321,6 +369,7 @@ impl<const D: usize> FlowForces<D> for FlowContact<D> {
             Contact { pair: force.pair, lambda, gamma: gamma(force.pair, lambda), gap: force.gap }
         };
         self.contacts = self.forces.iter().map(contact).collect();
+        self.repelled.swap(0, 1);
         if self.rule.is_some() {
             let state = |one: &Contact| PairState { pair: one.pair, gamma: one.gamma, lambda: one.lambda };
             self.memory.pairs = self.contacts.iter().map(state).collect();
@@ -361,7 +410,8 @@ impl<const D: usize> ContactModel<D> for FlowContact<D> {
             let (normal, force) = (numbers(&one.normal), numbers(&one.force));
             ForceState { pair: one.pair, normal, force }
         };
-        ContactState { in_flow: self.forces.iter().map(state).collect(), ..self.memory.clone() }
+        let in_flow = self.forces.iter().map(state).collect();
+        ContactState { in_flow, repelled: self.repelled[0].clone(), ..self.memory.clone() }
     }
 
     fn resume(&mut self, state: ContactState) -> Result<(), MemoryError> {
@@ -376,6 +426,7 @@ impl<const D: usize> ContactModel<D> for FlowContact<D> {
             gap: 0.0,
         };
         self.forces = std::mem::take(&mut state.in_flow).into_iter().map(force).collect();
+        self.repelled[0] = std::mem::take(&mut state.repelled);
         self.memory = state;
         self.contacts.clear();
         Ok(())
@@ -385,7 +436,7 @@ impl<const D: usize> ContactModel<D> for FlowContact<D> {
     fn reverse(&mut self) {
         self.memory.reverse();
         match self.params.law {
-            NormalLaw::Rough { .. } => self.forces.clear(),
+            NormalLaw::Rough { .. } | NormalLaw::None => self.forces.clear(),
             NormalLaw::Smooth(_) => self.forces.iter_mut().for_each(|force| force.force = -force.force),
         }
     }

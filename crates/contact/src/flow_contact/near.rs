@@ -1,24 +1,24 @@
 //! The pairs that are near in a step, and which of them take part.
 
-use gluey_geom::{Twist, Vector};
+use gluey_geom::Twist;
 
 use super::params::FlowContactParams;
-use super::solve::{Coulomb, Outcome, resolution};
+use super::solve::{Coulomb, Outcome, PairForce, resolution};
 use super::touch::Touch;
 use crate::{BodyStep, ContactError, PairKey, TwistMobility};
 
-/// The force on the partner of a pair.
+/// The force of a pair.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct KnownForce<const D: usize> {
     pub pair: PairKey,
-    pub force: Vector<D>,
+    pub force: PairForce<D>,
 }
 
 /// Pairs that are near in a step, sorted, of which some take part.
 #[derive(Debug, Default)]
 pub(super) struct NearPairs<const D: usize> {
     pub touches: Vec<Touch<D>>,
-    pub forces: Vec<Vector<D>>,
+    pub forces: Vec<PairForce<D>>,
     pub takes_part: Vec<bool>,
 }
 
@@ -29,17 +29,18 @@ impl<const D: usize> NearPairs<D> {
     }
 
     /// Those that take part, with their forces.
-    pub fn parts(&self) -> impl Iterator<Item = (&Touch<D>, &Vector<D>)> {
+    pub fn parts(&self) -> impl Iterator<Item = (&Touch<D>, &PairForce<D>)> {
         let all = self.touches.iter().zip(&self.forces).zip(&self.takes_part);
         all.filter(|part| *part.1).map(|(part, _)| part)
     }
 
-    /// Lets pairs take part whose gaps these motions take below the roughness; tells whether there are any.
+    /// Lets pairs take part whose gaps these motions take below the roughness, or that repel each other; tells
+    /// whether there are any.
     fn admit(&mut self, step: &BodyStep<'_, D>, twists: &[Twist<D>]) -> bool {
         let (mut is_any, resolution) = (false, resolution(step));
         for (touch, takes_part) in self.touches.iter().zip(&mut self.takes_part) {
-            let closes = || touch.gap_after(step, twists) < touch.floor - resolution;
-            if !*takes_part && touch.can_yield() && closes() {
+            let acts = || touch.acts_at(touch.gap_after(step, twists), resolution);
+            if !*takes_part && touch.can_yield() && acts() {
                 (*takes_part, is_any) = (true, true);
             }
         }
@@ -59,7 +60,7 @@ impl<const D: usize> NearPairs<D> {
         loop {
             let chosen: Vec<usize> = (0..self.touches.len()).filter(|&k| self.takes_part[k]).collect();
             let touches: Vec<Touch<D>> = chosen.iter().map(|&k| self.touches[k]).collect();
-            let mut forces: Vec<Vector<D>> = chosen.iter().map(|&k| self.forces[k]).collect();
+            let mut forces: Vec<PairForce<D>> = chosen.iter().map(|&k| self.forces[k]).collect();
             let mut problem =
                 Coulomb { step, touches: &touches, params, rate, mobility: &mut *mobility, free };
             let outcome = problem.solve(&mut forces).map_err(|stalled| ContactError::NotConverged {

@@ -36,6 +36,8 @@ pub enum NormalLaw {
     },
     /// Smooth surfaces with the law and the memory of [`crate::PairContact`].
     Smooth(ContactParams),
+    /// Surfaces that do not touch, wherever they are: they may repel each other.
+    None,
 }
 
 /// Parameters of [`super::FlowContact`].
@@ -67,7 +69,7 @@ impl FlowContactParams {
     pub(super) fn roughness(&self) -> f64 {
         match self.law {
             NormalLaw::Rough { roughness } => roughness,
-            NormalLaw::Smooth(_) => 0.0,
+            NormalLaw::Smooth(_) | NormalLaw::None => 0.0,
         }
     }
 }

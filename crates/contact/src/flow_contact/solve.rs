@@ -6,7 +6,8 @@
 //! `F_n <- max(0, F_n - (g - g_0) / (c d_n))`, `F_t <- P(F_t - v_t / d_t)`, `|P| <= mu max(0, F_n - F_c)`,
 //!
 //! with the gap `g` at the end of the step, the smallest gap `g_0` and the slip `v_t`. A fixed point is a
-//! solution, exact in the gaps. In a mobility with films between the pairs `d` is close to the inverse of `B
+//! solution, exact in the gaps. Where the two repel each other, that force and the one of the contact are found
+//! together, for both follow from the gap. In a mobility with films between the pairs `d` is close to the inverse of `B
 //! M B^T`, so that steps are few; [`Anderson`]'s acceleration makes them fewer.
 
 use gluey_geom::{Twist, Vector, Wrench};
@@ -36,6 +37,40 @@ pub(super) struct Coulomb<'a, const D: usize> {
     pub free: &'a [Twist<D>],
 }
 
+/// What the partner of a pair feels.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct PairForce<const D: usize> {
+    /// The force of their contact.
+    pub contact: Vector<D>,
+    /// Repulsion beyond that at the beginning of the step, positive apart.
+    pub excess: f64,
+}
+
+impl<const D: usize> PairForce<D> {
+    /// A force of a contact.
+    pub fn of_contact(contact: Vector<D>) -> Self {
+        Self { contact, excess: 0.0 }
+    }
+
+    fn minus(&self, other: &Self) -> Self {
+        Self { contact: self.contact - other.contact, excess: self.excess - other.excess }
+    }
+
+    /// Contact and repulsion.
+    fn total(&self, touch: &Touch<D>) -> Vector<D> {
+        self.contact + touch.normal * self.excess
+    }
+
+    /// Numbers whose squares are powers.
+    fn weighted(&self, touch: &Touch<D>) -> impl Iterator<Item = f64> + use<D> {
+        let [along, across] = touch.compliance.map(f64::sqrt);
+        let pressing = touch.normal * (touch.normal.dot(&self.contact) * along);
+        let contact = pressing + touch.across(&self.contact) * across;
+        let numbers: [f64; D] = contact.into();
+        numbers.into_iter().chain([self.excess * along])
+    }
+}
+
 /// Outcome of the iteration.
 pub(super) struct Outcome<const D: usize> {
     /// Motions with the forces.
@@ -56,28 +91,33 @@ pub(super) struct Stalled {
 
 impl<const D: usize> Coulomb<'_, D> {
     /// The forces on the partners, from a guess.
-    pub fn solve(&mut self, forces: &mut Vec<Vector<D>>) -> Result<Outcome<D>, Stalled> {
+    pub fn solve(&mut self, forces: &mut [PairForce<D>]) -> Result<Outcome<D>, Stalled> {
         let mut anderson = Anderson::new(WINDOW);
         let (mut history, mut least) = (Vec::new(), f64::INFINITY);
         for iterations in 0usize.. {
             let twists = self.twists(forces);
-            let asked: Vec<Vector<D>> = self
+            let asked: Vec<PairForce<D>> = self
                 .touches
                 .iter()
                 .zip(&*forces)
                 .map(|(touch, force)| self.asked(touch, force, &twists))
                 .collect();
-            let change = self.weighted(|k| asked[k] - forces[k]);
-            let (change_size, size) = (norm(&change), norm(&self.weighted(|k| forces[k])));
+            let changes: Vec<PairForce<D>> =
+                asked.iter().zip(&*forces).map(|(asked, force)| asked.minus(force)).collect();
+            let change = self.weighted(&changes);
+            let (change_size, size) = (norm(&change), norm(&self.weighted(forces)));
             let residual = if change_size > 0.0 { change_size / size.max(f64::MIN_POSITIVE) } else { 0.0 };
             if iterations == 0 || iterations.is_power_of_two() {
                 history.push((iterations, residual));
             }
             if residual <= self.params.tolerance || change_size <= self.noise() {
+                if drop_parted(forces, &asked) {
+                    continue;
+                }
                 return Ok(Outcome { twists, iterations, residual });
             }
             if iterations == self.params.iteration_limit || residual.is_nan() {
-                let of_pair = |k: usize| (asked[k] - forces[k]).norm();
+                let of_pair = |k: usize| changes[k].total(&self.touches[k]).norm();
                 let worst = (0..forces.len()).max_by(|&a, &b| of_pair(a).total_cmp(&of_pair(b))).unwrap_or(0);
                 let history = ResidualHistory { entries: history };
                 return Err(Stalled { residual, iterations, history, worst });
@@ -88,8 +128,9 @@ impl<const D: usize> Coulomb<'_, D> {
             }
             least = least.min(change_size);
             let next = anderson.next(flat(&asked), change);
-            for (k, (force, next)) in forces.iter_mut().zip(next.chunks_exact(D)).enumerate() {
-                *force = self.admitted(&self.touches[k], &Vector::from_column_slice(next));
+            for (k, (force, next)) in forces.iter_mut().zip(next.chunks_exact(D + 1)).enumerate() {
+                let contact = self.admitted(&self.touches[k], &Vector::from_column_slice(&next[..D]));
+                *force = PairForce { contact, excess: next[D] };
             }
         }
         unreachable!("the loop ends by itself")
@@ -103,9 +144,12 @@ impl<const D: usize> Coulomb<'_, D> {
     }
 
     /// The motions with these forces.
-    fn twists(&mut self, forces: &[Vector<D>]) -> Vec<Twist<D>> {
+    fn twists(&mut self, forces: &[PairForce<D>]) -> Vec<Twist<D>> {
         let mut loads = vec![Wrench::default(); self.free.len()];
-        self.touches.iter().zip(forces).for_each(|(touch, force)| touch.add_to(force, &mut loads));
+        self.touches
+            .iter()
+            .zip(forces)
+            .for_each(|(touch, force)| touch.add_to(&force.total(touch), &mut loads));
         let mut twists = vec![Twist::default(); loads.len()];
         self.mobility.respond(&loads, &mut twists);
         twists.iter_mut().zip(self.free).for_each(|(twist, free)| *twist = *twist + *free);
@@ -113,11 +157,21 @@ impl<const D: usize> Coulomb<'_, D> {
     }
 
     /// The force that a pair asks for where motions with `force` are these.
-    fn asked(&self, touch: &Touch<D>, force: &Vector<D>, twists: &[Twist<D>]) -> Vector<D> {
-        let [along, across] = touch.compliance;
-        let excess = (touch.gap_after(self.step, twists) - touch.floor) / self.step.velocity_weight;
+    fn asked(&self, touch: &Touch<D>, force: &PairForce<D>, twists: &[Twist<D>]) -> PairForce<D> {
+        let across = touch.compliance[1];
+        let yielding = touch.compliance[0] * self.step.velocity_weight;
+        let gap = touch.gap_after(self.step, twists);
         let slip = touch.across(&touch.velocity(twists));
-        self.admitted(touch, &(force - touch.normal * (excess / along) - slip / across))
+        let pressing = touch.normal.dot(&force.contact);
+        let free = gap + yielding * (touch.least - pressing - force.excess);
+        let mut excess = touch.repulsion.map_or(0.0, |law| law.excess(free, yielding));
+        let mut asked = touch.least;
+        if touch.least + excess < pressing + force.excess - (gap - touch.floor) / yielding {
+            excess = touch.repulsion.map_or(0.0, |law| law.excess_at(touch.floor));
+            asked = pressing + force.excess - (gap - touch.floor) / yielding - excess;
+        }
+        let tangential = touch.across(&force.contact) - slip / across;
+        PairForce { contact: self.admitted(touch, &(touch.normal * asked + tangential)), excess }
     }
 
     /// The nearest force within the cone, its normal part first.
@@ -130,15 +184,9 @@ impl<const D: usize> Coulomb<'_, D> {
         touch.normal * pressing + tangential * share
     }
 
-    /// Vectors of pairs as numbers whose squares are powers.
-    fn weighted(&self, of: impl Fn(usize) -> Vector<D>) -> Vec<f64> {
-        let weigh = |(k, touch): (usize, &Touch<D>)| {
-            let [along, across] = touch.compliance.map(f64::sqrt);
-            let vector = of(k);
-            touch.normal * (touch.normal.dot(&vector) * along) + touch.across(&vector) * across
-        };
-        let all: Vec<Vector<D>> = self.touches.iter().enumerate().map(weigh).collect();
-        flat(&all)
+    /// Forces of pairs as numbers whose squares are powers.
+    fn weighted(&self, forces: &[PairForce<D>]) -> Vec<f64> {
+        forces.iter().zip(self.touches).flat_map(|(force, touch)| force.weighted(touch)).collect()
     }
 }
 
@@ -148,8 +196,20 @@ pub(super) fn resolution<const D: usize>(step: &BodyStep<'_, D>) -> f64 {
     NOISE * f64::EPSILON * extent
 }
 
-fn flat<const D: usize>(vectors: &[Vector<D>]) -> Vec<f64> {
-    vectors.iter().flatten().copied().collect()
+/// Lets go of what is left of the forces of contacts that part; tells whether there are any.
+fn drop_parted<const D: usize>(forces: &mut [PairForce<D>], asked: &[PairForce<D>]) -> bool {
+    let mut is_any = false;
+    for (force, asked) in forces.iter_mut().zip(asked) {
+        if asked.contact.amax() == 0.0 && force.contact.amax() > 0.0 {
+            (force.contact, is_any) = (Vector::zeros(), true);
+        }
+    }
+    is_any
+}
+
+/// Components of the contacts' forces, and repulsion.
+fn flat<const D: usize>(forces: &[PairForce<D>]) -> Vec<f64> {
+    forces.iter().flat_map(|force| force.contact.iter().copied().chain([force.excess])).collect()
 }
 
 fn norm(x: &[f64]) -> f64 {

@@ -2,7 +2,8 @@
 
 use gluey_geom::{Dim, Twist, Vector, Wrench};
 
-use crate::{BodyStep, Domain, PairKey, Partner};
+use crate::repulsion::PairRepulsion;
+use crate::{BodyStep, Domain, PairKey, Partner, Repulsion};
 
 /// A pair where it is at the beginning of a step.
 #[derive(Clone, Copy, Debug)]
@@ -10,8 +11,10 @@ pub(super) struct Touch<const D: usize> {
     pub pair: PairKey,
     /// From the particle to its partner, of length one.
     pub normal: Vector<D>,
-    /// The smallest gap that roughness leaves.
+    /// The smallest gap that roughness leaves; minus infinity where surfaces do not touch.
     pub floor: f64,
+    /// How the two repel each other.
+    pub repulsion: Option<PairRepulsion<D>>,
     /// From the centres of the particle and its partner to the middle of the gap.
     pub arms: [Vector<D>; 2],
     /// Velocity of the partner beyond that of its particle: of an image that slides, or of a wall.
@@ -22,6 +25,8 @@ pub(super) struct Touch<const D: usize> {
     /// the step.
     rest: f64,
     half_gap: f64,
+    /// Radii; infinite of a wall.
+    radii: [f64; 2],
     /// The least normal force: negative for contacts that pull.
     pub least: f64,
     /// Velocity per force along the normal and across it.
@@ -67,9 +72,24 @@ impl<const D: usize> Touch<D> {
             shift,
             rest,
             half_gap: 0.5 * gap,
+            radii: [radius, second.map_or(f64::INFINITY, |_| other)],
+            repulsion: None,
             least: 0.0,
             compliance: [1.0; 2],
         })
+    }
+
+    /// Lets the two repel each other, after a step with the force `before`, where forces count by `rate`.
+    pub fn repel(&mut self, law: Repulsion, before: f64, rate: f64, step: &BodyStep<'_, D>) {
+        let repulsion = PairRepulsion::new(law, self.radii, 2.0 * self.half_gap, before, rate, step);
+        self.repulsion = Some(repulsion);
+    }
+
+    /// Whether the two act on each other where the step ends with this gap: touch, or repel each other now or
+    /// then.
+    pub fn acts_at(&self, gap: f64, resolution: f64) -> bool {
+        let reaches = |law: PairRepulsion<D>| gap.min(2.0 * self.half_gap) < law.reach();
+        gap < self.floor - resolution || self.repulsion.is_some_and(reaches)
     }
 
     /// Velocity of the partner's surface beyond that of the particle's in the middle of the gap.

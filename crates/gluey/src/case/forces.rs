@@ -3,8 +3,9 @@
 use std::f64::consts::PI;
 
 use gluey_contact::FlowContactParams;
+use gluey_contact::Repulsion;
 use gluey_geom::{Dim, Vector, Wrench};
-use gluey_suspension::{Repulsion, ball_volume};
+use gluey_suspension::ball_volume;
 
 use super::{Case, Metric, ParticleSpec, RepulsionSpec};
 

@@ -3,7 +3,7 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// Repulsion of particles and walls, see [`gluey_suspension::Repulsion`].
+/// Repulsion of particles and walls, see [`gluey_contact::Repulsion`].
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct RepulsionSpec {

@@ -200,9 +200,9 @@ fn gap_lines<const D: usize>(
 
 #[cfg(test)]
 mod tests {
+    use gluey_contact::Repulsion;
     use gluey_contact::{Contact, Domain, PairKey, Wall};
     use gluey_geom::{Particle, Twist};
-    use gluey_suspension::Repulsion;
 
     use super::*;
 

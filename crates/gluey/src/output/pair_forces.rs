@@ -1,7 +1,6 @@
 //! The forces between near pairs, for their table.
 
-use gluey_contact::{Contact, Partner};
-use gluey_suspension::Repulsion;
+use gluey_contact::{Contact, Partner, Repulsion};
 
 /// Forces between pairs at an instant.
 #[derive(Clone, Copy, Debug, Default)]

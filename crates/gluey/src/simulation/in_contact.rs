@@ -49,6 +49,8 @@ pub(super) struct ContactPrediction<const D: usize> {
     pub prediction: Prediction<D>,
     /// The part of the step for which there are forces.
     pub part: Part,
+    /// Why the whole was not.
+    pub refused: Option<String>,
     pub gaps: GapReport,
 }
 
@@ -71,16 +73,17 @@ pub(super) fn predicted_in_contact<const D: usize, H: Hydrodynamics<D>>(
         mobility: mobility.ok_or(StepError::Forces { step, time, source: NoForces })?,
         changes: Vec::new(),
         is_loose: false,
+        refused: None,
         corrected: Ok(Default::default()),
     };
     let loads = iteration.begin().map_err(contact_failed)?;
     let now = Configuration { contacts: Some(&loads), ..*now };
     let predicted = hydrodynamics.predict_with_contacts(&now, &mut |flow| iteration.after(flow));
-    let ContactIteration { start: StepStart { part, .. }, changes, corrected, .. } = iteration;
+    let ContactIteration { start: StepStart { part, .. }, changes, refused, corrected, .. } = iteration;
     let prediction = predicted.map_err(flow_failed)?;
     let (twists, report) = corrected.map_err(contact_failed)?;
     let gaps = GapReport { contacts: report.contact, changes, ..GapReport::default() };
-    Ok(ContactPrediction { prediction: Prediction { twists, ..prediction }, part, gaps })
+    Ok(ContactPrediction { prediction: Prediction { twists, ..prediction }, part, refused, gaps })
 }
 
 /// The iteration of a step.
@@ -94,6 +97,8 @@ struct ContactIteration<'a, const D: usize> {
     changes: Vec<f64>,
     /// Whether the last flow was less accurate than it is to be in the end.
     is_loose: bool,
+    /// Why the step was halved, where it was.
+    refused: Option<String>,
     /// Velocities after the last flow.
     corrected: Result<(Vec<Twist<D>>, FlowContactReport), ContactError>,
 }
@@ -135,7 +140,10 @@ impl<const D: usize> ContactIteration<'_, D> {
             let StepStart { part, most_halvings, .. } = self.start;
             match found {
                 Ok(report) => return Ok((twists, report)),
-                Err(error) => self.start.part = part.halved(most_halvings).ok_or(error)?,
+                Err(error) => {
+                    self.refused = Some(error.to_string());
+                    self.start.part = part.halved(most_halvings).ok_or(error)?;
+                }
             }
         }
     }

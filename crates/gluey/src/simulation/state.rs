@@ -24,6 +24,8 @@ pub struct SimulationState<const D: usize> {
     pub integrator: Integrator<D>,
     /// Memory of films.
     pub films: FilmMemory,
+    /// Forces by which particles repelled each other, where no contact in the flow has them.
+    pub repelling: ContactState,
     /// Memory of the contact model.
     pub contact: ContactState,
     /// Warm start of the flow, as [`Hydrodynamics::checkpoint`] gave it.

@@ -1,0 +1,97 @@
+//! What keeps particles apart before contacts that correct velocities after the flow: repulsion, then films.
+
+use gluey_contact::{ContactError, ContactModel, FilmError, FilmReport, TwistMobility, film_reach};
+use gluey_geom::Twist;
+use gluey_motion::{Configuration, Hydrodynamics, NoForces};
+
+use super::error::StepError;
+use super::repelling::Repelling;
+use super::{Simulation, Sliding};
+
+/// Reason why a step is to be done in halves.
+#[derive(Debug, thiserror::Error)]
+enum Refusal {
+    #[error(transparent)]
+    Film(FilmError),
+    #[error(transparent)]
+    Repulsion(ContactError),
+}
+
+impl<const D: usize, H, C> Simulation<D, H, C>
+where
+    H: Hydrodynamics<D>,
+    C: ContactModel<D>,
+{
+    /// Lets particles repel each other and films stay open in the part of the step that is to be done, which
+    /// is halved until they do.
+    pub(super) fn keep_apart(&mut self) -> Result<FilmReport, StepError<H::Error>> {
+        let mut mobility = self.mobility_of_repulsion()?;
+        let predicted = self.prediction.twists.clone();
+        loop {
+            let repelled =
+                mobility.as_deref_mut().map_or(Ok(()), |mobility| self.repel(mobility, &predicted));
+            let opened = repelled.map_err(Refusal::Repulsion);
+            let refusal = match opened.and_then(|()| self.open_films().map_err(Refusal::Film)) {
+                Ok(report) => {
+                    self.repelling.iter_mut().for_each(Repelling::finish);
+                    return Ok(report);
+                }
+                Err(refusal) => refusal,
+            };
+            let is_given = matches!(&refusal, Refusal::Film(source) if source.is_given());
+            let half = self.part.halved(self.most_halvings).filter(|_| !is_given);
+            let (step, time, length) = (self.step, self.time(), self.part_length());
+            let reason = refusal.to_string();
+            self.part = half.ok_or(match refusal {
+                Refusal::Film(source) => StepError::Film { step, time, length, source },
+                Refusal::Repulsion(source) => StepError::Contact { step, time, source },
+            })?;
+            self.motion.refused = Some(reason);
+        }
+    }
+
+    /// The mobility in which the repulsion of the step is sought.
+    fn mobility_of_repulsion(&self) -> Result<Option<Box<dyn TwistMobility<D>>>, StepError<H::Error>> {
+        if self.repelling.is_none() {
+            return Ok(None);
+        }
+        let (step, time) = (self.step, self.time());
+        let mobility = self.hydrodynamics.near_mobility(&self.configuration());
+        let mobility = mobility.map_err(|source| StepError::Flow { step, time, source })?;
+        mobility.map(Some).ok_or(StepError::Forces { step, time, source: NoForces })
+    }
+
+    /// The motions with the repulsion of the part of the step, from those with that of its beginning.
+    fn repel(
+        &mut self,
+        mobility: &mut dyn TwistMobility<D>,
+        predicted: &[Twist<D>],
+    ) -> Result<(), ContactError> {
+        let (dt, rate) = (self.part_length(), self.prediction.rate);
+        let tilt = self.strain * self.sliding.map_or(0.0, |Sliding { height, .. }| height);
+        let surroundings = [tilt, self.slide() * dt, rate];
+        let Self { integrator, particles, repelling, prediction, phases, .. } = self;
+        prediction.twists.copy_from_slice(predicted);
+        let Some(repelling) = repelling else { return Ok(()) };
+        integrator.with_step(dt, particles, |step| {
+            phases.time("motion", || repelling.correct(surroundings, step, mobility, &mut prediction.twists))
+        })
+    }
+
+    fn open_films(&mut self) -> Result<FilmReport, FilmError> {
+        let (dt, rate, time) = (self.part_length(), self.sliding_rate(), self.time());
+        let (shear_factor, strain) = (self.shear_factor(), self.strain);
+        let Self { integrator, particles, hydrodynamics, films, prediction, phases, .. } = self;
+        integrator.with_step(dt, particles, |step| {
+            let now = Configuration { shear_factor, strain, ..Configuration::at(time, particles) };
+            let near = hydrodynamics.films(&now, film_reach(step, &prediction.twists, rate));
+            phases.time("motion", || films.open(step, &near, &mut prediction.twists))
+        })
+    }
+
+    /// Particles and surroundings where they are.
+    fn configuration(&self) -> Configuration<'_, D> {
+        let (shear_factor, strain) = (self.shear_factor(), self.strain);
+        Configuration { shear_factor, strain, ..Configuration::at(self.time(), &self.particles) }
+    }
+}
