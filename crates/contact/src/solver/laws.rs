@@ -14,7 +14,7 @@ use super::{DelassusOperator, ResidualHistory, SolveFailure, SolveReport, dot};
 /// steps...
 pub(crate) const TOLERANCE: f64 = 1e-10;
 /// ... or as near as this share of the thinnest gap.
-pub(crate) const LEAST: f64 = 1e-2;
+const LEAST: f64 = 1e-2;
 /// Newton steps at most. A linear problem takes one to ten.
 const MOST_NEWTON_STEPS: usize = 100;
 /// Iterations of a Newton step at most; what is left then is left to the next.

@@ -35,7 +35,7 @@ pub use accelerated::Accelerated;
 pub use active_set::ActiveSet;
 pub use auto::Auto;
 pub use factor::Factor;
-pub(crate) use laws::{GapLaw, LEAST, LawProblem, Loads, TOLERANCE, farthest};
+pub(crate) use laws::{GapLaw, LawProblem, Loads, TOLERANCE, farthest};
 pub use spectrum::largest_eigenvalue;
 pub use uzawa::Uzawa;
 
