@@ -1,12 +1,13 @@
 //! Two equal, torque-free spheres in an unbounded linear flow, exactly (Batchelor and Green 1972,
-//! DOI 10.1017/S0022112072002927), free or pushed along their line of centres ([`approach_mobility`]).
+//! DOI 10.1017/S0022112072002927), free or pushed along their line of centres ([`approach_mobility`]), by
+//! contacts too.
 //!
 //! With a gap offset the mobility is evaluated at `gap + offset`: the spheres then approach faster than they
 //! should and overlap, as they do in a fluid solver that does not resolve the lubrication film.
 
 use std::f64::consts::PI;
 
-use gluey_contact::{Film, PairKey};
+use gluey_contact::{Film, LoneDrag, PairKey, TwistMobility};
 use gluey_geom::{Dim, Particle, Twist, Vector, Wrench};
 
 use crate::{Configuration, Hydrodynamics, LinearFlow, MobilityTable, Prediction, approach_mobility};
@@ -70,24 +71,79 @@ impl PairMobility {
         self.offset = offset;
         self
     }
+
+    /// The two, and the way from the first to the second.
+    fn pair<'a>(&self, particles: &'a [Particle<3>]) -> Result<PairAt<'a>, PairMobilityError> {
+        let [first, second] = equal_pair(particles)?;
+        let r = second.pose.position - first.pose.position;
+        let distance = r.norm();
+        if !(distance > 0.0 && distance.is_finite()) {
+            return Err(PairMobilityError::NoDirection { distance });
+        }
+        let gap = distance / first.radius - 2.0 + self.offset;
+        Ok(PairAt { particles: [first, second], r, normal: r / distance, gap })
+    }
+}
+
+/// Where two spheres are.
+struct PairAt<'a> {
+    particles: [&'a Particle<3>; 2],
+    /// From the centre of the first to that of the second, and its direction.
+    r: Vector<3>,
+    normal: Vector<3>,
+    /// Gap with its offset, in radii.
+    gap: f64,
+}
+
+impl PairAt<'_> {
+    /// Velocity of the second per force on it along the normal, the opposite of which acts on the first.
+    fn yielding(&self) -> f64 {
+        approach_mobility(self.gap) / (6.0 * PI * self.particles[0].radius)
+    }
+}
+
+/// Mobility of a pair: exact for opposite forces along the line of centres, for others the drag that each has
+/// alone.
+#[derive(Clone, Copy, Debug)]
+struct PushMobility {
+    normal: Vector<3>,
+    radii: [f64; 2],
+    yielding: f64,
+}
+
+impl PushMobility {
+    fn drag(&self) -> LoneDrag<'_> {
+        LoneDrag { viscosity: 1.0, radii: &self.radii, is_held: &[] }
+    }
+}
+
+impl TwistMobility<3> for PushMobility {
+    fn respond(&mut self, loads: &[Wrench<3>], twists: &mut [Twist<3>]) {
+        let push = self.normal * (0.5 * (loads[1].force - loads[0].force).dot(&self.normal));
+        let mut rest = [loads[0], loads[1]];
+        rest[0].force += push;
+        rest[1].force -= push;
+        self.drag().respond(&rest, twists);
+        twists[0].velocity -= push * self.yielding;
+        twists[1].velocity += push * self.yielding;
+    }
+
+    fn of_pair(&self, pair: PairKey) -> [f64; 2] {
+        let [_, across] = TwistMobility::<3>::of_pair(&self.drag(), pair);
+        [2.0 * self.yielding, across]
+    }
 }
 
 impl Hydrodynamics<3> for PairMobility {
     type Error = PairMobilityError;
 
     fn predict(&mut self, configuration: &Configuration<'_, 3>) -> Result<Prediction<3>, PairMobilityError> {
-        let [first, second] = equal_pair(configuration.particles)?;
         let flow = self.flow.scaled(configuration.shear_factor);
-        let r = second.pose.position - first.pose.position;
-        let distance = r.norm();
-        if !(distance > 0.0 && distance.is_finite()) {
-            return Err(PairMobilityError::NoDirection { distance });
-        }
-        let n = r / distance;
-        let xi = distance / first.radius - 2.0 + self.offset;
-        let mobility = self.table.at(xi);
-        // Each sphere moves as alone under its force, but for the other that is pushed the other way.
-        let push = push(configuration.wrenches, &n)? * approach_mobility(xi) / (6.0 * PI * first.radius);
+        let pair = self.pair(configuration.particles)?;
+        let PairAt { particles: [first, second], r, normal: n, gap } = pair;
+        let mobility = self.table.at(gap);
+        let of_contacts = configuration.contacts.map_or(&[][..], |loads| &loads.wrenches);
+        let push = (push(configuration.wrenches, &n)? + push(of_contacts, &n)?) * pair.yielding();
 
         let strain = flow.strain_rate() * r;
         let normal = n * n.dot(&strain);
@@ -96,7 +152,7 @@ impl Hydrodynamics<3> for PairMobility {
             + (strain - normal) * mobility.one_minus_b;
         // By symmetry the mid-point moves with the fluid.
         let middle = flow.velocity(&((first.pose.position + second.pose.position) * 0.5));
-        let spin = flow.spin() + Dim::<3>::moment(&n, &(strain / distance)) * mobility.spin;
+        let spin = flow.spin() + Dim::<3>::moment(&n, &(strain / r.norm())) * mobility.spin;
         let velocity = |side: f64| middle + (relative + n * (2.0 * push)) * side;
         let twists = [-0.5, 0.5].map(|side| Twist { velocity: velocity(side), spin });
         Ok(Prediction::of(twists.to_vec()))
@@ -104,6 +160,16 @@ impl Hydrodynamics<3> for PairMobility {
 
     fn answers_to_forces(&self) -> bool {
         true
+    }
+
+    fn near_mobility(
+        &self,
+        configuration: &Configuration<'_, 3>,
+    ) -> Result<Option<Box<dyn TwistMobility<3>>>, PairMobilityError> {
+        let pair = self.pair(configuration.particles)?;
+        let radii = pair.particles.map(|particle| particle.radius);
+        let mobility = PushMobility { normal: pair.normal, radii, yielding: pair.yielding() };
+        Ok(Some(Box::new(mobility)))
     }
 
     fn films(&self, configuration: &Configuration<'_, 3>, reach: f64) -> Vec<Film<3>> {

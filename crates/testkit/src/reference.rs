@@ -140,6 +140,11 @@ reference_table!(
     "rough_pairs.csv"
 );
 reference_table!(
+    /// Paths of two equal rough spheres in shear: `eps, y0, z0, turn, t_turn, t_end, x, y, z, t_contact`.
+    rough_paths,
+    "rough_paths.csv"
+);
+reference_table!(
     /// Square (0) and hexagonal (1) lattices of discs:
     /// `lattice, phi, gap_over_a, drag_F_over_muU, eta_axes_strain, eta_shear, rel_diff_drag`.
     lattices_of_discs,

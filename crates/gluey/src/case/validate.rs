@@ -240,6 +240,15 @@ fn check_contact(case: &Case, key: &Key, findings: &mut CaseFindings) {
         let needs = "the strategy \"rough\", \"gluey\" or \"inelastic\"".to_owned();
         return findings.unfit(key.name("metric"), format!("\"{metric}\""), needs, format!("\"{strategy}\""));
     }
+    let choice = format!("\"{strategy}\" in the metric of the flow");
+    if is_rough && flow.hydrodynamics == Hydrodynamics::PairMobility {
+        // Which knows what forces along the line of centres do.
+        if contact.friction != 0.0 {
+            let found = contact.friction.to_string();
+            findings.unfit(key.name("friction"), "the pair mobility", "friction = 0".to_owned(), found);
+        }
+        return;
+    }
     let lubrication = if is_rough { Lubrication::Deficit } else { Lubrication::None };
     let wanted = [
         ("flow.hydrodynamics", Hydrodynamics::Stokes.name(), flow.hydrodynamics.name()),
@@ -247,7 +256,6 @@ fn check_contact(case: &Case, key: &Key, findings: &mut CaseFindings) {
         ("flow.lubrication", lubrication.name(), case.lubrication().name()),
     ];
     if let Some((name, needed, found)) = wanted.into_iter().find(|(_, needed, found)| needed != found) {
-        let choice = format!("\"{strategy}\" in the metric of the flow");
         let needs = format!("{name} = \"{needed}\"");
         findings.unfit(key.name("strategy"), choice, needs, format!("\"{found}\""));
     }

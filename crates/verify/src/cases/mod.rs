@@ -16,6 +16,7 @@ mod manufactured;
 mod pair_stresslets;
 mod random_pairs;
 mod rough_pairs;
+mod rough_paths;
 mod sheared;
 mod spheres;
 mod symmetry;
@@ -37,6 +38,7 @@ pub const CASES: &[VerificationCase] = &[
     pair_stresslets::CASE,
     unequal_pairs::CASE,
     rough_pairs::CASE,
+    rough_paths::CASE,
     wall::DISC,
     wall::SPHERE,
     lattices::CASE,
