@@ -57,7 +57,7 @@ fn the_flow_answers_as_to_given_forces() {
             "name = \"two\"\ndimension = 2\nshear_rate = 0.0\n{repulsion}\ndomain.boundary = \"periodic\"\n\
              particles = [{{ position = [0.05, 0.125], radius = 0.1{} }},\n\
                           {{ position = [0.85, 0.125], radius = 0.08{} }}]\n\
-             time = {{ step = 0.001, end = 0.001 }}\ncontact = {{ strategy = \"none\" }}\n\
+             time = {{ step = 1e-8, end = 1e-8 }}\ncontact = {{ strategy = \"none\" }}\n\
              flow = {{ formulation = \"unfitted\", mesh = {{ cells_per_radius = 3.0 }} }}",
             forces[0], forces[1]
         )
@@ -78,6 +78,28 @@ fn the_flow_answers_as_to_given_forces() {
     for k in 0..2 {
         assert!((found[k] - exact[k]).norm() < 1e-6 * exact[k].norm(), "{found:?} {exact:?}");
     }
+}
+
+/// Shear presses two spheres together that repel each other, in steps in which repulsion alone would take them
+/// apart by several of its ranges: the order in the step is two.
+#[test]
+fn steps_are_longer_than_repulsion_is_stiff() {
+    let ends = [0.1, 0.05, 0.025, 0.0125].map(|step| {
+        let case = case(&format!(
+            "name = \"pair\"\ndimension = 3\nshear_rate = 1.0\nrepulsion = {{ force = 50.0, range = 0.005 }}\n\
+             particles = [{{ position = [0.65, 0.495, 0.5], radius = 0.05 }},\n\
+                          {{ position = [0.35, 0.505, 0.5], radius = 0.05 }}]\n\
+             time = {{ step = {step}, end = 40.0 }}\ncontact = {{ strategy = \"none\" }}\n\
+             flow = {{ hydrodynamics = \"pair-mobility\" }}"
+        ));
+        let (gaps, rows) = ran(&case, |csv| (column(csv, "gap12_over_a"), centers::<3>(csv, 2)));
+        let smallest = gaps.iter().copied().fold(f64::INFINITY, f64::min);
+        let last = rows.last().expect("a row");
+        [smallest, (last[1] - last[0]).y / 0.05]
+    });
+    println!("smallest gap, offset at the end: {ends:?}");
+    let off: Vec<f64> = ends.iter().map(|end| (end[1] - ends[3][1]).abs()).collect();
+    assert!(off[0] < 5e-3 && off[1] < 0.45 * off[0] && off[2] < 0.3 * off[1], "{off:?}");
 }
 
 /// Energy of repulsion where discs of the radius `a` are.

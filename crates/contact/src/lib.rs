@@ -49,6 +49,7 @@ mod domain;
 mod error;
 mod films;
 mod flow_contact;
+mod gaps;
 mod grid;
 mod island_projection;
 mod islands;
@@ -76,8 +77,9 @@ pub use gluey_geom as geom;
 
 pub use domain::{Domain, Wall};
 pub use error::ContactError;
-pub use films::{Film, FilmError, FilmMemory, FilmReport, GapReport, film_reach};
+pub use films::{Film, FilmError, FilmMemory, FilmReport, Floor, GapReport, StandingGap, film_reach};
 pub use flow_contact::{FlowContact, FlowContactParams, Friction, NormalLaw};
+pub use gaps::{GapError, correct_gaps};
 pub use key::{PairKey, Partner};
 pub use memory::{ContactState, ForceState, MemoryError, PairState};
 pub use mobility::{LoneDrag, Mobility, StokesDrag, TwistMobility, WithFixed};

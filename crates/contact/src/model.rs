@@ -5,7 +5,9 @@ use gluey_geom::{Matrix, Pose, Twist, Vector, Wrench};
 use serde::{Deserialize, Serialize};
 
 use crate::projection::Effort;
-use crate::{ContactError, ContactState, Domain, MemoryError, PairKey, Repulsion, TwistMobility, Wall};
+use crate::{
+    ContactError, ContactState, Domain, MemoryError, PairKey, Repulsion, StandingGap, TwistMobility, Wall,
+};
 
 /// The step `x^{n+1} = x^n + c u^n + drift` whose velocities are to be corrected. One entry per particle.
 #[derive(Clone, Copy, Debug)]
@@ -109,13 +111,19 @@ pub trait FlowForces<const D: usize> {
     /// symmetric part, in a box that is periodic in all directions.
     fn stresses(&self) -> [Matrix<D>; 2];
 
-    /// What the forces load the particles of a step with.
+    /// The smallest gap that a pair may have; unit: length.
+    fn smallest_gap(&self, pair: PairKey, radii: &[f64]) -> f64;
+
+    /// Tells of pairs with films in the next correction. Others move along straight lines.
+    fn set_standing_gaps(&mut self, gaps: Vec<StandingGap>);
+
+    /// What the forces load the particles of a step with, in the flow that is computed next.
     ///
     /// # Errors
     /// Those of pairs that are not there.
-    fn loads(&self, step: &BodyStep<'_, D>) -> Result<Vec<Wrench<D>>, ContactError>;
+    fn loads(&mut self, step: &BodyStep<'_, D>) -> Result<Vec<Wrench<D>>, ContactError>;
 
-    /// Corrects `twists`, those of a flow in which the forces act, so that no gap is below the smallest one
+    /// Corrects `twists`, those of a flow in which the forces of the last [`FlowForces::loads`] act, so that no gap is below the smallest one
     /// at the end of the step, with the forces that this takes in this mobility.
     ///
     /// # Errors
@@ -126,6 +134,12 @@ pub trait FlowForces<const D: usize> {
         mobility: &mut dyn TwistMobility<D>,
         twists: &mut [Twist<D>],
     ) -> Result<FlowContactReport, ContactError>;
+
+    /// Takes over the gaps that the contacts of the last correction have after a step with these motions.
+    ///
+    /// # Errors
+    /// Those of pairs that are not there.
+    fn measure_gaps(&mut self, step: &BodyStep<'_, D>, twists: &[Twist<D>]) -> Result<(), ContactError>;
 
     /// Ends a step: remembers what its last correction found.
     fn finish(&mut self);

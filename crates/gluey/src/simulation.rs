@@ -237,6 +237,8 @@ where
             limits: self.iteration,
             tilt,
             slide: self.slide(),
+            sliding_rate: self.sliding_rate(),
+            films: &self.films,
         };
         let now = Configuration {
             time,
@@ -252,7 +254,7 @@ where
             return self.hydrodynamics.predict(&now).map_err(|source| StepError::Flow { step, time, source });
         };
         let found = predicted_in_contact(&mut self.hydrodynamics, contact, &now, start)?;
-        self.part = found.part;
+        (self.part, self.films) = (found.part, found.films);
         self.motion.refused = found.refused.or(self.motion.refused.take());
         if self.part.is_first() {
             self.gaps = found.gaps;

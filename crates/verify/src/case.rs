@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::fmt::Write;
 
-use gluey_contact::{ContactError, FilmError};
+use gluey_contact::{ContactError, FilmError, GapError};
 use gluey_motion::PairMobilityError;
 use gluey_stokes::StokesError;
 use gluey_stokes::fem::MeshError;
@@ -45,6 +45,9 @@ pub enum VerifyError {
     /// In contacts.
     #[error(transparent)]
     Contact(#[from] ContactError),
+    /// In films and contacts of a step.
+    #[error(transparent)]
+    Gaps(#[from] GapError),
     /// In the configuration of particles.
     #[error(transparent)]
     Packing(#[from] PackingError),

@@ -116,20 +116,27 @@ impl<const D: usize> Film<D> {
         (REST * (gap - reach) + SCALE * singular) * self.drag()
     }
 
-    /// The gap with this impulse, sought from another one, and its derivative by the impulse.
+    /// An impulse so low that no load of neighbours takes the gap from `floor`.
+    pub(super) fn pressed(&self, floor: f64) -> f64 {
+        self.impulse(floor.max(self.thinnest())) - self.drag() * self.curvature_radius
+    }
+
+    /// The gap with this impulse, sought from another one, and its derivative by the impulse, where surfaces
+    /// touch at a gap of `floor`.
     ///
-    /// No thinner than half of what positions resolve. Where the impulse asks for less than that, the gap is
-    /// all but fixed.
-    pub(super) fn gap_of(&self, impulse: f64, start: f64) -> (f64, f64) {
-        let thinnest = self.thinnest();
-        let missing = self.impulse(thinnest) - impulse;
+    /// No thinner than the floor less half of what positions resolve. Where the impulse asks for less than
+    /// that, the gap is all but fixed.
+    pub(super) fn gap_of(&self, impulse: f64, floor: f64, start: f64) -> (f64, f64) {
+        let floor = floor.max(self.thinnest());
+        let missing = self.impulse(floor) - impulse;
         if missing <= 0.0 {
             let gap = self.open_gap_of(impulse, start);
             return (gap, 1.0 / self.resistance(gap));
         }
-        let steepness = 2.0 / (self.resistance(thinnest) * thinnest);
+        let slack = 0.5 * self.thinnest();
+        let steepness = 1.0 / (self.resistance(floor) * slack);
         let share = 1.0 / (1.0 + steepness * missing);
-        (0.5 * thinnest * (1.0 + share), 0.5 * thinnest * steepness * share * share)
+        (floor - slack * (1.0 - share), slack * steepness * share * share)
     }
 
     /// Where it is not closed: Newton's method in `ln g`, in which the impulse is convex, kept in a bracket.
@@ -188,11 +195,13 @@ pub(super) struct FilmLaw<'a, const D: usize> {
     pub film: &'a Film<D>,
     /// The impulse.
     pub asked: f64,
+    /// The gap at which surfaces touch.
+    pub floor: f64,
 }
 
 impl<const D: usize> GapLaw for FilmLaw<'_, D> {
     fn gap(&self, load: f64, start: f64) -> (f64, f64) {
-        self.film.gap_of(self.asked - load, start)
+        self.film.gap_of(self.asked - load, self.floor, start)
     }
 
     fn thinnest(&self) -> f64 {

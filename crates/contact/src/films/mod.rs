@@ -15,6 +15,9 @@
 //! limit of a vanishing viscosity a gap is closed as long as `gamma < 0`. Here that limit is met where a film
 //! is thinner than positions resolve.
 //!
+//! Rough surfaces touch at a gap `g_0`. Their contact force is found with the velocities ([`crate::FlowContact`]),
+//! as the one with which `I = Phi(g_0)`; a film is at `g_0` then, for which `Phi` falls there without bound.
+//!
 //! Only the shape of `R` matters, not its scale: over the drag of two particles against each other, `A/2` in
 //! the units of contact, it is `s (rho(g) - rho(G))` for `g < G`, and next to nothing beyond, with
 //! `rho = A/g` for spheres, `(A/g)^(3/2)` for discs, where `2/A = 1/a + 1/b` for radii `a` and `b`.
@@ -32,7 +35,7 @@ use gluey_geom::Twist;
 #[cfg(feature = "serde")]
 use serde::{Deserialize, Serialize};
 
-use crate::{BodyStep, ContactReport, ContactState, PairState};
+use crate::{BodyStep, ContactReport, ContactState, PairKey, PairState};
 
 /// Films push a particle at most so many of its radii in a step. They are known up to gaps of three radii
 /// beyond what the flow closes, so that no two can meet that were not known to be near.
@@ -59,6 +62,27 @@ const MOST_PUSHED: f64 = 1.0;
 #[derive(Clone, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(Serialize, Deserialize))]
 pub struct FilmMemory(ContactState);
+
+/// Gap of a film as seen along a straight line: `g + (I - Phi(g)) / R(g)` of an impulse `I`, with the gap `g` at
+/// the beginning of the step. What the velocities of the step add to it is linear.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct StandingGap {
+    /// The two sides.
+    pub pair: PairKey,
+    /// At the end of a step in which the two stand still against each other.
+    pub gap: f64,
+    /// Where they touch.
+    pub floor: f64,
+}
+
+/// Gap at which the surfaces of a pair touch.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Floor {
+    /// The gap; zero for smooth surfaces.
+    pub gap: f64,
+    /// Whether a contact presses them together there in the step.
+    pub is_pressed: bool,
+}
 
 /// Report on the films of a step.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -96,21 +120,38 @@ impl FilmMemory {
         films: &[Film<D>],
         twists: &mut [Twist<D>],
     ) -> Result<FilmReport, FilmError> {
-        let (weight, old_weight) = (step.velocity_weight, step.dt - step.velocity_weight);
-        let asked = |film: &Film<D>| {
-            let gap = film.gap.max(film.thinnest());
-            let (normal, resistance) = (film.branch.normalize(), film.resistance(gap));
-            let lambda = -resistance * normal.dot(&film.across(|k| twists[k].velocity, 1.0));
-            let before = self.0.find(film.pair);
-            let of_history =
-                || -resistance * normal.dot(&film.across(|k| step.drift[k].velocity, old_weight));
-            let known = before.map_or_else(of_history, |before| old_weight * before.lambda);
-            let closed = before.filter(|_| gap <= 2.0 * film.thinnest());
-            let start = closed.map_or(film.impulse(gap), |before| before.gamma);
-            PairState { pair: film.pair, gamma: start - weight * lambda - known, lambda }
+        self.open_above(step, films, &|_| Floor::default(), twists)
+    }
+
+    /// The same for surfaces that touch at the gap `floor` of their pair: no gap is below it by more than
+    /// 1e-9 `A`, and those of pairs that are pressed together are there.
+    ///
+    /// # Errors
+    /// Those of [`FilmMemory::open`].
+    pub fn open_above<const D: usize>(
+        &mut self,
+        step: &BodyStep<'_, D>,
+        films: &[Film<D>],
+        floor: &dyn Fn(PairKey) -> Floor,
+        twists: &mut [Twist<D>],
+    ) -> Result<FilmReport, FilmError> {
+        let weight = step.velocity_weight;
+        let floors: Vec<Floor> = films.iter().map(|film| floor(film.pair)).collect();
+        let asked = |(film, &Floor { gap: floor, is_pressed }): (&Film<D>, &Floor)| {
+            let resistance = film.resistance(film.gap.max(floor).max(film.thinnest()));
+            let lambda = -resistance * film.branch.normalize().dot(&film.across(|k| twists[k].velocity, 1.0));
+            let free = self.known(step, film, floor) - weight * lambda;
+            let gamma = if is_pressed { film.pressed(floor) } else { free };
+            PairState { pair: film.pair, gamma, lambda }
         };
-        let mut states: Vec<PairState> = films.iter().map(asked).collect();
-        let changes = open(step, films, &mut states, &step.moves(twists))?;
+        let mut states: Vec<PairState> = films.iter().zip(&floors).map(asked).collect();
+        let changes = open(
+            step,
+            films,
+            &floors.iter().map(|floor| floor.gap).collect::<Vec<_>>(),
+            &mut states,
+            &step.moves(twists),
+        )?;
         let pushes = changes.iter().zip(step.radii).map(|(change, radius)| change.norm() / radius);
         let farther = |most: (usize, f64), next: (usize, f64)| if next.1 > most.1 { next } else { most };
         let (particle, largest_push) = pushes.enumerate().fold((0, 0.0), farther);
@@ -122,5 +163,34 @@ impl FilmMemory {
         self.0.pairs = states;
         let closed_count = films.iter().filter(|film| film.is_closed()).count();
         Ok(FilmReport { closed_count, largest_push })
+    }
+    /// The gap at the end of a step in which a film's sides stand still against each other, for surfaces that
+    /// touch at the gap `floor`.
+    pub fn standing_gap<const D: usize>(
+        &self,
+        step: &BodyStep<'_, D>,
+        film: &Film<D>,
+        floor: f64,
+    ) -> StandingGap {
+        let now = film.gap.max(floor).max(film.thinnest());
+        let seen = |impulse: f64| now + (impulse - film.impulse(now)) / film.resistance(now);
+        let (gap, floor) =
+            (seen(self.known(step, film, floor)), seen(film.impulse(floor.max(film.thinnest()))));
+        StandingGap { pair: film.pair, gap, floor }
+    }
+
+    /// The impulse at the end of a step but for what the velocities of the step add.
+    fn known<const D: usize>(&self, step: &BodyStep<'_, D>, film: &Film<D>, floor: f64) -> f64 {
+        let old_weight = step.dt - step.velocity_weight;
+        let gap = film.gap.max(floor).max(film.thinnest());
+        let before = self.0.find(film.pair);
+        let of_history = || {
+            let normal = film.branch.normalize();
+            -film.resistance(gap) * normal.dot(&film.across(|k| step.drift[k].velocity, old_weight))
+        };
+        let force = before.map_or_else(of_history, |before| old_weight * before.lambda);
+        // Rough surfaces forget what pressed them together.
+        let closed = before.filter(|_| gap <= 2.0 * film.thinnest());
+        closed.map_or(film.impulse(gap), |before| before.gamma) - force
     }
 }

@@ -12,13 +12,15 @@ use crate::{BodyStep, PairState};
 const PUSHED: f64 = 0.5;
 
 /// Displacements of the particles, beside the `free` ones, with which films have the gaps that the impulses
-/// of `states` give, as far as these agree; puts there what the films have in the end.
+/// of `states` give, as far as these agree and surfaces do not touch at the gaps `floors`; puts there what the
+/// films have in the end.
 ///
 /// # Errors
 /// [`FilmError`].
 pub(super) fn open<const D: usize>(
     step: &BodyStep<'_, D>,
     films: &[Film<D>],
+    floors: &[f64],
     states: &mut [PairState],
     free: &[Vector<D>],
 ) -> Result<Vec<Vector<D>>, FilmError> {
@@ -34,7 +36,8 @@ pub(super) fn open<const D: usize>(
     let mut is_in: Vec<bool> = (0..films.len()).map(concerns).collect();
     let (chosen, mut found) = loop {
         let chosen: Vec<usize> = (0..films.len()).filter(|&k| is_in[k]).collect();
-        let laws = chosen.iter().map(|&k| FilmLaw { film: &films[k], asked: states[k].gamma });
+        let laws =
+            chosen.iter().map(|&k| FilmLaw { film: &films[k], asked: states[k].gamma, floor: floors[k] });
         let found = balance(step, free, laws.collect())?;
         // Large steps push particles onto others that were far away.
         let more: Vec<usize> =

@@ -30,12 +30,12 @@ use crate::pair_contact::Centers;
 use crate::{
     BodyStep, Contact, ContactError, ContactForce, ContactModel, ContactReport, ContactState, Domain,
     FlowContactReport, FlowForces, ForceState, LoneDrag, MemoryError, PairKey, PairState, Partner, Repulsion,
-    StepGeometry, TwistMobility,
+    StandingGap, StepGeometry, TwistMobility,
 };
 use anderson::Anderson;
 use near::{KnownForce, NearPairs};
 use solve::{Outcome, PairForce};
-use touch::Touch;
+use touch::{Touch, mean_radius};
 
 pub use params::{FlowContactParams, Friction, NormalLaw};
 
@@ -60,6 +60,10 @@ pub struct FlowContact<const D: usize> {
     repulsion: Option<Repulsion>,
     /// Forces by which pairs repelled each other in the last step, and in that of the last correction, sorted.
     repelled: [Vec<(PairKey, f64)>; 2],
+    /// Those that act in the last flow.
+    in_flow: Vec<ContactForce<D>>,
+    /// Those of pairs with films, sorted.
+    standing_gaps: Vec<StandingGap>,
     /// Memory of smooth surfaces after the last step.
     memory: ContactState,
     /// The rule by which that changes in the step of the last correction.
@@ -67,6 +71,8 @@ pub struct FlowContact<const D: usize> {
     contacts: Vec<Contact>,
     /// Motions without the forces that the last correction began with, in the same step.
     free: Option<Vec<Twist<D>>>,
+    /// Whether the next correction is of a flow that none was of.
+    is_new_flow: bool,
     acceleration: Anderson,
 }
 
@@ -82,12 +88,15 @@ impl<const D: usize> FlowContact<D> {
             neighbours: NeighbourList::default(),
             centers: Centers::default(),
             forces: Vec::new(),
+            in_flow: Vec::new(),
+            standing_gaps: Vec::new(),
             repulsion: None,
             repelled: Default::default(),
             memory: ContactState::default(),
             rule: None,
             contacts: Vec::new(),
             free: None,
+            is_new_flow: true,
             acceleration: Anderson::new(WINDOW),
         }
     }
@@ -122,10 +131,39 @@ impl<const D: usize> FlowContact<D> {
             let along = self.walls_along.get(wall as usize).copied().unwrap_or_else(Vector::zeros);
             touch.slide += along * self.shear_factor;
         }
+        let standing = self.standing_gaps.binary_search_by_key(&pair, |standing| standing.pair);
+        standing.into_iter().for_each(|k| touch.follow(&self.standing_gaps[k]));
         if self.params.law == NormalLaw::None {
             touch.floor = f64::NEG_INFINITY;
         }
         Ok(touch)
+    }
+
+    /// What the forces in the flow load the particles with.
+    fn loads_in_flow(&self, step: &BodyStep<'_, D>) -> Result<Vec<Wrench<D>>, ContactError> {
+        let mut loads = vec![Wrench::default(); step.poses.len()];
+        for force in &self.in_flow {
+            self.touch(force.pair, step)?.add_to(&force.force, &mut loads);
+        }
+        Ok(loads)
+    }
+
+    /// Motions without the forces in the flow, accelerated; those of before where the flow is the same.
+    fn without_contacts(
+        &mut self,
+        step: &BodyStep<'_, D>,
+        mobility: &mut dyn TwistMobility<D>,
+        flow: &[Twist<D>],
+    ) -> Result<Vec<Twist<D>>, ContactError> {
+        if let Some(free) = self.free.take_if(|_| !self.is_new_flow) {
+            return Ok(free);
+        }
+        let mut free = vec![Twist::default(); step.poses.len()];
+        mobility.respond(&self.loads_in_flow(step)?, &mut free);
+        free.iter_mut().zip(flow).for_each(|(free, flow)| *free = *flow - *free);
+        self.accelerate(step, &mut free);
+        self.is_new_flow = false;
+        Ok(free)
     }
 
     /// From the third flow on, goes on from a combination of the motions without forces.
@@ -254,12 +292,12 @@ impl<const D: usize> FlowContact<D> {
         let mut repelled = Vec::new();
         for (touch, PairForce { contact: force, excess }) in near.parts() {
             repelled.extend(touch.repulsion.map(|law| (touch.pair, law.now + excess)));
-            let before = self.forces.binary_search_by_key(&touch.pair, |before| before.pair);
-            let before = before.map_or(Vector::zeros(), |k| self.forces[k].force);
+            let before = self.in_flow.binary_search_by_key(&touch.pair, |before| before.pair);
+            let before = before.map_or(Vector::zeros(), |k| self.in_flow[k].force);
             if touch.repulsion.is_some() && force.amax().max(before.amax()) == 0.0 {
                 continue;
             }
-            let gap = touch.gap_after(step, &outcome.twists);
+            let gap = touch.gap_at_end(step, &outcome.twists);
             report.contact.count_pair(gap, touch.normal.dot(force), || touch.pair);
             change += touch.power(&(force - before));
             size += touch.power(force).max(touch.power(&before));
@@ -294,7 +332,7 @@ impl<const D: usize> FlowForces<D> for FlowContact<D> {
     }
 
     fn begin(&mut self, step: &BodyStep<'_, D>) -> Result<(), ContactError> {
-        self.free = None;
+        (self.free, self.is_new_flow) = (None, true);
         self.acceleration.restart();
         let turned = self.forces.iter().map(|force| {
             let touch = self.touch(force.pair, step)?;
@@ -331,12 +369,19 @@ impl<const D: usize> FlowForces<D> for FlowContact<D> {
         [normal.sum(), tangential.sum()]
     }
 
-    fn loads(&self, step: &BodyStep<'_, D>) -> Result<Vec<Wrench<D>>, ContactError> {
-        let mut loads = vec![Wrench::default(); step.poses.len()];
-        for force in &self.forces {
-            self.touch(force.pair, step)?.add_to(&force.force, &mut loads);
-        }
-        Ok(loads)
+    fn loads(&mut self, step: &BodyStep<'_, D>) -> Result<Vec<Wrench<D>>, ContactError> {
+        self.in_flow.clone_from(&self.forces);
+        self.is_new_flow = true;
+        self.loads_in_flow(step)
+    }
+
+    fn smallest_gap(&self, pair: PairKey, radii: &[f64]) -> f64 {
+        self.params.roughness() * mean_radius(pair, radii)
+    }
+
+    fn set_standing_gaps(&mut self, mut gaps: Vec<StandingGap>) {
+        gaps.sort_unstable_by_key(|standing| standing.pair);
+        self.standing_gaps = gaps;
     }
 
     fn correct(
@@ -345,10 +390,7 @@ impl<const D: usize> FlowForces<D> for FlowContact<D> {
         mobility: &mut dyn TwistMobility<D>,
         twists: &mut [Twist<D>],
     ) -> Result<FlowContactReport, ContactError> {
-        let mut free = vec![Twist::default(); step.poses.len()];
-        mobility.respond(&self.loads(step)?, &mut free);
-        free.iter_mut().zip(&*twists).for_each(|(free, flow)| *free = *flow - *free);
-        self.accelerate(step, &mut free);
+        let free = self.without_contacts(step, mobility, twists)?;
         let mut centers = std::mem::take(&mut self.centers);
         let found = self.solve(step, &centers.of(step), mobility, &free);
         self.centers = centers;
@@ -356,6 +398,13 @@ impl<const D: usize> FlowForces<D> for FlowContact<D> {
         twists.copy_from_slice(&outcome.twists);
         self.free = Some(free);
         Ok(self.take_over(step, &near, &outcome))
+    }
+
+    fn measure_gaps(&mut self, step: &BodyStep<'_, D>, twists: &[Twist<D>]) -> Result<(), ContactError> {
+        for k in 0..self.forces.len() {
+            self.forces[k].gap = self.touch(self.forces[k].pair, step)?.gap_at_end(step, twists);
+        }
+        Ok(())
     }
 
     fn finish(&mut self) {
@@ -386,6 +435,8 @@ impl<const D: usize> ContactModel<D> for FlowContact<D> {
         twists: &mut [Twist<D>],
     ) -> Result<ContactReport, ContactError> {
         let before = std::mem::take(&mut self.forces);
+        self.in_flow.clear();
+        self.is_new_flow = true;
         let mut drag = LoneDrag { viscosity: self.params.viscosity, radii: step.radii, is_held: &[] };
         self.free = None;
         match self.correct(step, &mut drag, twists) {

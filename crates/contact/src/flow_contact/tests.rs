@@ -6,8 +6,8 @@ use gluey_geom::{Dim, Pose, Spin, Twist, Vector};
 
 use super::{FlowContact, FlowContactParams, Friction, NormalLaw};
 use crate::{
-    BodyStep, ContactLaw, ContactModel, ContactParams, Domain, FlowForces, GammaUpdate, LoneDrag,
-    PairContact, Wall,
+    BodyStep, ContactForce, ContactLaw, ContactModel, ContactParams, Domain, FlowForces, GammaUpdate,
+    LoneDrag, PairContact, Repulsion, Wall,
 };
 
 const DT: f64 = 1e-3;
@@ -94,7 +94,7 @@ fn surfaces_stick_or_slip() {
 #[test]
 fn forces_are_in_balance() {
     let encounter = Encounter::new();
-    let (contact, _) = encounter.corrected(rough(0.5));
+    let (mut contact, _) = encounter.corrected(rough(0.5));
     let [first, second] = contact.loads(&encounter.step()).expect("loads")[..] else { panic!("two loads") };
     assert!((first.force + second.force).norm() < 1e-14);
     let arm = encounter.poses[1].position;
@@ -177,13 +177,47 @@ fn walls_drag_what_they_touch() {
 #[test]
 fn forces_survive_a_checkpoint() {
     let encounter = Encounter::new();
-    let (contact, _) = encounter.corrected(rough(0.5));
+    let (mut contact, _) = encounter.corrected(rough(0.5));
     let mut other = FlowContact::new(rough(0.5), Domain::default());
     other.resume(contact.checkpoint()).expect("a state");
     other.begin(&encounter.step()).expect("known pairs");
-    let [a, b] = [&contact, &other].map(|contact| contact.loads(&encounter.step()).expect("loads"));
+    let [a, b] = [&mut contact, &mut other].map(|contact| contact.loads(&encounter.step()).expect("loads"));
     assert!(a.iter().zip(&b).all(|(a, b)| (a.force - b.force).norm() < 1e-14));
     let mut state = contact.checkpoint();
     state.in_flow[0].force[1] = f64::NAN;
     assert!(other.resume(state).is_err());
+}
+
+/// Two spheres that run at each other are held apart by repulsion with the gap at the end, or, where it is too
+/// weak, by it and the contact.
+#[test]
+fn repulsion_and_contact_share_a_push() {
+    let encounter = Encounter::new();
+    let push = 0.5 * 6.0 * PI / (1.0 / RADII[0] + 1.0 / RADII[1]);
+    // Between these radii the law has 4/3 of its force.
+    for (force, is_enough) in [(10.0 * push, true), (0.3 * push, false)] {
+        let law = Repulsion { force, range: 0.01, radius: 1.0 };
+        let mut contact = FlowContact::new(rough(0.0), Domain::default());
+        contact.set_repulsion(law);
+        let mut twists = encounter.twists;
+        let step = BodyStep { velocity_weight: 0.05, dt: 0.05, ..encounter.step() };
+        let mut drag = LoneDrag { viscosity: 1.0, radii: &RADII, is_held: &[] };
+        contact.begin(&step).expect("a step");
+        contact.correct(&step, &mut drag, &mut twists).expect("forces");
+        contact.measure_gaps(&step, &twists).expect("gaps");
+        contact.finish();
+        let [position, other] = [0, 1].map(|k| encounter.poses[k].position + twists[k].velocity * step.dt);
+        let gap = (other - position).norm() - 3.0;
+        let [ContactForce { force, gap: measured, .. }] = contact.forces() else {
+            assert!(is_enough && gap > 0.01 * 1.5, "{gap}");
+            // The first step has no history: the force is that of its end.
+            let moved = twists[1].velocity.x - encounter.twists[1].velocity.x;
+            let found = moved * 6.0 * PI * RADII[1] + law.at::<3>(0.015, RADII);
+            assert!((found / law.at::<3>(gap, RADII) - 1.0).abs() < 1e-9, "{found} {gap}");
+            continue;
+        };
+        assert!(!is_enough && (measured - 0.015).abs() < 1e-12 && (gap - 0.015).abs() < 1e-12, "{gap}");
+        // The flow has the repulsion at this gap.
+        assert!((force.norm() / push - 1.0).abs() < 0.05, "{force} {push}");
+    }
 }

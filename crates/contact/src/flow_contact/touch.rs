@@ -3,7 +3,7 @@
 use gluey_geom::{Dim, Twist, Vector, Wrench};
 
 use crate::repulsion::PairRepulsion;
-use crate::{BodyStep, Domain, PairKey, Partner, Repulsion};
+use crate::{BodyStep, Domain, PairKey, Partner, Repulsion, StandingGap};
 
 /// A pair where it is at the beginning of a step.
 #[derive(Clone, Copy, Debug)]
@@ -11,7 +11,7 @@ pub(super) struct Touch<const D: usize> {
     pub pair: PairKey,
     /// From the particle to its partner, of length one.
     pub normal: Vector<D>,
-    /// The smallest gap that roughness leaves; minus infinity where surfaces do not touch.
+    /// The smallest gap that roughness leaves, in a film as [`StandingGap`] has it; minus infinity where surfaces do not touch.
     pub floor: f64,
     /// How the two repel each other.
     pub repulsion: Option<PairRepulsion<D>>,
@@ -25,12 +25,20 @@ pub(super) struct Touch<const D: usize> {
     /// the step.
     rest: f64,
     half_gap: f64,
+    /// The gap at the end of the step where the two stand still against each other, if a film says.
+    standing_gap: Option<f64>,
     /// Radii; infinite of a wall.
     radii: [f64; 2],
     /// The least normal force: negative for contacts that pull.
     pub least: f64,
     /// Velocity per force along the normal and across it.
     pub compliance: [f64; 2],
+}
+
+/// The radius that the roughness of a pair is a share of.
+pub(super) fn mean_radius(pair: PairKey, radii: &[f64]) -> f64 {
+    let (first, second) = pair.particles();
+    0.5 * (radii[first] + second.map_or(radii[first], |second| radii[second]))
 }
 
 impl<const D: usize> Touch<D> {
@@ -55,7 +63,6 @@ impl<const D: usize> Touch<D> {
         let distance = branch.norm();
         let normal = (distance > 0.0).then(|| branch / distance)?;
         let gap = distance - radius - other;
-        let mean_radius = if second.is_some() { 0.5 * (radius + other) } else { radius };
         let rest = match pair.second {
             Partner::Particle { .. } => radius + other,
             Partner::Wall(wall) => {
@@ -66,12 +73,13 @@ impl<const D: usize> Touch<D> {
         Some(Self {
             pair,
             normal,
-            floor: roughness * mean_radius,
+            floor: roughness * mean_radius(pair, step.radii),
             arms: [normal * (radius + 0.5 * gap), normal * -(other + 0.5 * gap)],
             slide,
             shift,
             rest,
             half_gap: 0.5 * gap,
+            standing_gap: None,
             radii: [radius, second.map_or(f64::INFINITY, |_| other)],
             repulsion: None,
             least: 0.0,
@@ -104,8 +112,21 @@ impl<const D: usize> Touch<D> {
         vector - self.normal * self.normal.dot(vector)
     }
 
-    /// The gap at the end of the step.
+    /// Lets the gap follow the impulse of the film between the two.
+    pub fn follow(&mut self, film: &StandingGap) {
+        (self.standing_gap, self.floor) = (Some(film.gap), film.floor);
+    }
+
+    /// The gap at the end of the step; in a film as [`StandingGap`] has it.
     pub fn gap_after(&self, step: &BodyStep<'_, D>, twists: &[Twist<D>]) -> f64 {
+        if let Some(gap) = self.standing_gap {
+            return gap + self.normal.dot(&self.velocity(twists)) * step.velocity_weight;
+        }
+        self.gap_at_end(step, twists)
+    }
+
+    /// The gap where the particles are at the end of the step.
+    pub fn gap_at_end(&self, step: &BodyStep<'_, D>, twists: &[Twist<D>]) -> f64 {
         // As the integrator does it: first each end position, rounded, then their difference.
         let end = |k: usize| {
             step.poses[k].position + (twists[k].velocity * step.velocity_weight + step.drift[k].velocity)

@@ -1,9 +1,10 @@
 //! Why a simulation cannot go on.
 
-use gluey_contact::{ContactError, FilmError, MemoryError};
+use gluey_contact::{ContactError, FilmError, GapError, MemoryError};
 use gluey_motion::{NoForces, ResumeError};
 use thiserror::Error;
 
+use super::part::Part;
 use crate::number_text::shown;
 
 /// A step could not be done.
@@ -103,5 +104,24 @@ impl<E: std::error::Error + 'static> RestoreError<E> {
             Self::Flow(error) => RestoreError::Flow(error.widen()),
             Self::Contact(error) => RestoreError::Contact(error),
         }
+    }
+}
+
+/// Half of this part of a step, if that may help where gaps cannot be corrected in it.
+pub(super) fn half_after(error: &GapError, part: Part, most_halvings: u32) -> Option<Part> {
+    let is_given = matches!(error, GapError::Film(source) if source.is_given());
+    part.halved(most_halvings).filter(|_| !is_given)
+}
+
+/// The end of a step that begins at this time, where the smallest one that was tried has this length.
+pub(super) fn end_after<E: std::error::Error>(
+    error: GapError,
+    step: usize,
+    time: f64,
+    length: f64,
+) -> StepError<E> {
+    match error {
+        GapError::Film(source) => StepError::Film { step, time, length, source },
+        GapError::Contact(source) => StepError::Contact { step, time, source },
     }
 }

@@ -1,21 +1,12 @@
 //! What keeps particles apart before contacts that correct velocities after the flow: repulsion, then films.
 
-use gluey_contact::{ContactError, ContactModel, FilmError, FilmReport, TwistMobility, film_reach};
+use gluey_contact::{ContactError, ContactModel, FilmError, FilmReport, GapError, TwistMobility, film_reach};
 use gluey_geom::Twist;
 use gluey_motion::{Configuration, Hydrodynamics, NoForces};
 
-use super::error::StepError;
+use super::error::{StepError, end_after, half_after};
 use super::repelling::Repelling;
 use super::{Simulation, Sliding};
-
-/// Reason why a step is to be done in halves.
-#[derive(Debug, thiserror::Error)]
-enum Refusal {
-    #[error(transparent)]
-    Film(FilmError),
-    #[error(transparent)]
-    Repulsion(ContactError),
-}
 
 impl<const D: usize, H, C> Simulation<D, H, C>
 where
@@ -30,22 +21,17 @@ where
         loop {
             let repelled =
                 mobility.as_deref_mut().map_or(Ok(()), |mobility| self.repel(mobility, &predicted));
-            let opened = repelled.map_err(Refusal::Repulsion);
-            let refusal = match opened.and_then(|()| self.open_films().map_err(Refusal::Film)) {
+            let opened = repelled.map_err(GapError::from);
+            let error = match opened.and_then(|()| Ok(self.open_films()?)) {
                 Ok(report) => {
                     self.repelling.iter_mut().for_each(Repelling::finish);
                     return Ok(report);
                 }
-                Err(refusal) => refusal,
+                Err(error) => error,
             };
-            let is_given = matches!(&refusal, Refusal::Film(source) if source.is_given());
-            let half = self.part.halved(self.most_halvings).filter(|_| !is_given);
             let (step, time, length) = (self.step, self.time(), self.part_length());
-            let reason = refusal.to_string();
-            self.part = half.ok_or(match refusal {
-                Refusal::Film(source) => StepError::Film { step, time, length, source },
-                Refusal::Repulsion(source) => StepError::Contact { step, time, source },
-            })?;
+            let (half, reason) = (half_after(&error, self.part, self.most_halvings), error.to_string());
+            self.part = half.ok_or_else(|| end_after(error, step, time, length))?;
             self.motion.refused = Some(reason);
         }
     }

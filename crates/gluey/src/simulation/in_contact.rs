@@ -1,12 +1,13 @@
 //! Contacts whose forces act in the flow of a step: flow after flow, until they no longer change.
 
 use gluey_contact::{
-    BodyStep, ContactError, FlowContactParams, FlowContactReport, FlowForces, GapReport, TwistMobility,
+    BodyStep, ContactError, Film, FilmMemory, FilmReport, FlowContactParams, FlowContactReport, FlowForces,
+    GapError, GapReport, TwistMobility, correct_gaps, film_reach,
 };
 use gluey_geom::{Particle, Twist};
 use gluey_motion::{Configuration, ContactLoads, Hydrodynamics, Integrator, NoForces, Prediction};
 
-use super::error::StepError;
+use super::error::{StepError, end_after, half_after};
 use super::part::Part;
 
 /// The first flow of a step with contacts is so many times less accurate than the last: its forces change.
@@ -39,14 +40,19 @@ pub(super) struct StepStart<'a, const D: usize> {
     pub part: Part,
     pub most_halvings: u32,
     pub limits: FlowIteration,
-    /// Displacement of the image one period up, and its velocity.
+    /// Displacement of the image one period up, its velocity, and the rate of the shear.
     pub tilt: f64,
     pub slide: f64,
+    pub sliding_rate: f64,
+    /// Memory of films before the step.
+    pub films: &'a FilmMemory,
 }
 
 /// A prediction with velocities that contacts allow.
 pub(super) struct ContactPrediction<const D: usize> {
     pub prediction: Prediction<D>,
+    /// Memory of films after the step.
+    pub films: FilmMemory,
     /// The part of the step for which there are forces.
     pub part: Part,
     /// Why the whole was not.
@@ -63,27 +69,33 @@ pub(super) fn predicted_in_contact<const D: usize, H: Hydrodynamics<D>>(
 ) -> Result<ContactPrediction<D>, StepError<H::Error>> {
     let (step, time) = (start.step, now.time);
     let flow_failed = |source| StepError::Flow { step, time, source };
-    let contact_failed = |source| StepError::Contact { step, time, source };
     let mobility = hydrodynamics.near_mobility(now).map_err(flow_failed)?;
+    let films = start.with_step(now.particles, |step| {
+        let reach = film_reach(step, &vec![Twist::default(); step.poses.len()], start.sliding_rate);
+        hydrodynamics.films(now, reach)
+    });
     let mut iteration = ContactIteration {
         start,
         particles: now.particles,
         shear_factor: now.shear_factor,
         contact,
+        films,
         mobility: mobility.ok_or(StepError::Forces { step, time, source: NoForces })?,
         changes: Vec::new(),
         is_loose: false,
         refused: None,
         corrected: Ok(Default::default()),
     };
-    let loads = iteration.begin().map_err(contact_failed)?;
+    let loads = iteration.begin().map_err(|source| StepError::Contact { step, time, source })?;
     let now = Configuration { contacts: Some(&loads), ..*now };
     let predicted = hydrodynamics.predict_with_contacts(&now, &mut |flow| iteration.after(flow));
-    let ContactIteration { start: StepStart { part, .. }, changes, refused, corrected, .. } = iteration;
+    let ContactIteration { start, changes, refused, corrected, .. } = iteration;
     let prediction = predicted.map_err(flow_failed)?;
-    let (twists, report) = corrected.map_err(contact_failed)?;
-    let gaps = GapReport { contacts: report.contact, changes, ..GapReport::default() };
-    Ok(ContactPrediction { prediction: Prediction { twists, ..prediction }, part, refused, gaps })
+    let part = start.part;
+    let corrected = corrected.map_err(|error| end_after(error, step, time, start.length()))?;
+    let Corrected { twists, films, report, of_films } = corrected;
+    let gaps = GapReport { films: of_films, contacts: report.contact, changes };
+    Ok(ContactPrediction { prediction: Prediction { twists, ..prediction }, films, part, refused, gaps })
 }
 
 /// The iteration of a step.
@@ -92,6 +104,7 @@ struct ContactIteration<'a, const D: usize> {
     particles: &'a [Particle<D>],
     shear_factor: f64,
     contact: &'a mut dyn FlowForces<D>,
+    films: Vec<Film<D>>,
     mobility: Box<dyn TwistMobility<D>>,
     /// Changes of the forces by each flow so far.
     changes: Vec<f64>,
@@ -100,7 +113,27 @@ struct ContactIteration<'a, const D: usize> {
     /// Why the step was halved, where it was.
     refused: Option<String>,
     /// Velocities after the last flow.
-    corrected: Result<(Vec<Twist<D>>, FlowContactReport), ContactError>,
+    corrected: Result<Corrected<D>, GapError>,
+}
+
+/// Velocities that contacts and films allow, with what they are remembered by.
+#[derive(Default)]
+struct Corrected<const D: usize> {
+    twists: Vec<Twist<D>>,
+    films: FilmMemory,
+    report: FlowContactReport,
+    of_films: FilmReport,
+}
+
+impl<const D: usize> StepStart<'_, D> {
+    /// Length of the part that is to be done.
+    fn length(&self) -> f64 {
+        self.dt * self.part.share()
+    }
+
+    fn with_step<T>(&self, particles: &[Particle<D>], act: impl FnOnce(&BodyStep<'_, D>) -> T) -> T {
+        self.integrator.with_step(self.length(), particles, act)
+    }
 }
 
 impl<const D: usize> ContactIteration<'_, D> {
@@ -115,7 +148,7 @@ impl<const D: usize> ContactIteration<'_, D> {
     fn after(&mut self, prediction: &Prediction<D>) -> Option<ContactLoads<D>> {
         self.contact.set_rate(prediction.rate);
         self.corrected = self.correct(&prediction.twists);
-        let Ok((_, report)) = &self.corrected else { return None };
+        let Ok(Corrected { report, .. }) = &self.corrected else { return None };
         self.changes.push(report.change);
         let FlowIteration { tolerance, most_flows } = self.start.limits;
         let is_loose = std::mem::take(&mut self.is_loose);
@@ -124,28 +157,38 @@ impl<const D: usize> ContactIteration<'_, D> {
         }
         if self.changes.len() >= most_flows {
             let changes = self.changes.clone();
-            self.corrected = Err(ContactError::FlowNotConverged { changes, tolerance });
+            self.corrected = Err(ContactError::FlowNotConverged { changes, tolerance }.into());
             return None;
         }
         let loads = self.loads(1.0);
-        loads.map_err(|error| self.corrected = Err(error)).ok()
+        loads.map_err(|error| self.corrected = Err(error.into())).ok()
     }
 
-    /// Halves the step until there are forces.
-    fn correct(&mut self, flow: &[Twist<D>]) -> Result<(Vec<Twist<D>>, FlowContactReport), ContactError> {
+    /// Halves the step until there are forces, and films are in balance.
+    fn correct(&mut self, flow: &[Twist<D>]) -> Result<Corrected<D>, GapError> {
         loop {
-            let mut twists = flow.to_vec();
-            let found =
-                self.with_step(|contact, mobility, step| contact.correct(step, mobility, &mut twists));
             let StepStart { part, most_halvings, .. } = self.start;
-            match found {
-                Ok(report) => return Ok((twists, report)),
+            match self.try_to_correct(flow) {
+                Ok(corrected) => return Ok(corrected),
                 Err(error) => {
                     self.refused = Some(error.to_string());
-                    self.start.part = part.halved(most_halvings).ok_or(error)?;
+                    self.start.part = half_after(&error, part, most_halvings).ok_or(error)?;
                 }
             }
         }
+    }
+
+    /// Contacts first, with gaps that films have; then films, whose gaps are not below those of contacts.
+    fn try_to_correct(&mut self, flow: &[Twist<D>]) -> Result<Corrected<D>, GapError> {
+        let mut films = self.start.films.clone();
+        let near = std::mem::take(&mut self.films);
+        let corrected = self.with_step(|contact, mobility, step| {
+            let mut twists = flow.to_vec();
+            let (report, of_films) = correct_gaps(contact, (&mut films, &near), step, mobility, &mut twists)?;
+            Ok((twists, report, of_films))
+        });
+        self.films = near;
+        corrected.map(|(twists, report, of_films)| Corrected { twists, films, report, of_films })
     }
 
     /// The loads for a flow that may be so many times less accurate than the last one of the step.
@@ -160,9 +203,8 @@ impl<const D: usize> ContactIteration<'_, D> {
         &mut self,
         act: impl FnOnce(&mut dyn FlowForces<D>, &mut dyn TwistMobility<D>, &BodyStep<'_, D>) -> T,
     ) -> T {
-        let StepStart { integrator, dt, part, tilt, slide, .. } = self.start;
-        let length = dt * part.share();
-        self.contact.set_surroundings(tilt, slide * length, self.shear_factor);
-        integrator.with_step(length, self.particles, |step| act(self.contact, &mut *self.mobility, step))
+        let StepStart { tilt, slide, .. } = self.start;
+        self.contact.set_surroundings(tilt, slide * self.start.length(), self.shear_factor);
+        self.start.with_step(self.particles, |step| act(self.contact, &mut *self.mobility, step))
     }
 }

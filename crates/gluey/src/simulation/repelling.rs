@@ -48,6 +48,7 @@ impl<const D: usize> Repelling<D> {
     ) -> Result<(), ContactError> {
         self.implicit.set_surroundings(tilt, tilt_step, 1.0);
         self.implicit.set_rate(rate);
+        self.implicit.begin(step)?;
         self.implicit.correct(step, mobility, twists).map(|_| ())
     }
 

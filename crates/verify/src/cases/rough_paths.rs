@@ -1,9 +1,10 @@
 //! Encounters of two rough spheres, with exact velocities: what contact and steps make of them.
 
 use gluey_contact::{
-    ContactError, ContactModel, Domain, FlowContact, FlowContactParams, FlowForces, Friction, NormalLaw,
+    BodyStep, ContactModel, Domain, FilmMemory, FlowContact, FlowContactParams, FlowForces, Friction,
+    GapError, NormalLaw, correct_gaps, film_reach,
 };
-use gluey_geom::{Matrix, Particle, Vector};
+use gluey_geom::{Matrix, Particle, Twist, Vector, Wrench};
 use gluey_motion::{
     Configuration, ContactLoads, Hydrodynamics, Integrator, LinearFlow, PairMobility, Scheme,
 };
@@ -85,6 +86,7 @@ struct Encounter {
     integrator: Integrator<3>,
     shear_factor: f64,
     step: f64,
+    films: FilmMemory,
     time_in_contact: f64,
 }
 
@@ -100,6 +102,7 @@ impl Encounter {
             flow: PairMobility::new(LinearFlow::shear(1.0, 0.0)),
             contact: FlowContact::new(params, Domain::default()),
             integrator: Integrator::new(Scheme::AdamsBashforth2),
+            films: FilmMemory::default(),
             shear_factor: 1.0,
             step,
             time_in_contact: 0.0,
@@ -111,42 +114,54 @@ impl Encounter {
             true => self.integrator.reverse(),
             false => self.integrator.restart(),
         }
+        self.films.reverse();
         self.contact.reverse();
         self.shear_factor = -self.shear_factor;
     }
 
     fn advance(&mut self, steps: usize) -> Result<(), VerifyError> {
         for _ in 0..steps {
-            let Self { particles, flow, contact, integrator, shear_factor, step, .. } = self;
+            let Self { particles, flow, contact, integrator, films, shear_factor, step, .. } = self;
             let now = Configuration { shear_factor: *shear_factor, ..Configuration::at(0.0, particles) };
             let Some(mut mobility) = flow.near_mobility(&now)? else { continue };
-            let (mut twists, mut failure) = (Vec::new(), None);
-            integrator.with_step(*step, particles, |step| contact.begin(step))?;
+            let reach = |step: &BodyStep<'_, 3>| film_reach(step, &[Twist::default(); 2], 0.0);
+            let near = flow.films(&now, integrator.with_step(*step, particles, reach));
+            let (mut twists, mut after, mut failure) = (Vec::new(), films.clone(), None);
+            let begun = integrator.with_step(*step, particles, |step| {
+                contact.begin(step)?;
+                contact.loads(step)
+            });
+            let loads = loads(begun?);
             let mut next = |prediction: &gluey_motion::Prediction<3>| {
-                twists = prediction.twists.clone();
-                let corrected: Result<_, ContactError> = integrator.with_step(*step, particles, |step| {
-                    let report = contact.correct(step, &mut *mobility, &mut twists)?;
+                (twists, after) = (prediction.twists.clone(), films.clone());
+                let corrected: Result<_, GapError> = integrator.with_step(*step, particles, |step| {
+                    let known = (&mut after, &near[..]);
+                    let (report, _) = correct_gaps(contact, known, step, &mut *mobility, &mut twists)?;
                     Ok((report.change, contact.loads(step)?))
                 });
                 match corrected {
-                    Ok((change, wrenches)) if change > FLOW_TOLERANCE => {
-                        let [stress, stress_of_friction] = [Matrix::zeros(); 2];
-                        Some(ContactLoads { wrenches, stress, stress_of_friction, looseness: 1.0 })
-                    }
+                    Ok((change, wrenches)) if change > FLOW_TOLERANCE => Some(self::loads(wrenches)),
                     corrected => {
                         failure = corrected.err();
                         None
                     }
                 }
             };
-            flow.predict_with_contacts(&now, &mut next)?;
+            flow.predict_with_contacts(&Configuration { contacts: Some(&loads), ..now }, &mut next)?;
             failure.map_or(Ok(()), Err)?;
+            self.films = after;
             self.contact.finish();
             self.time_in_contact += if self.contact.forces().is_empty() { 0.0 } else { self.step };
             self.integrator.advance(self.step, &mut self.particles, &twists);
         }
         Ok(())
     }
+}
+
+/// Loads whose stress is of no interest.
+fn loads(wrenches: Vec<Wrench<3>>) -> ContactLoads<3> {
+    let [stress, stress_of_friction] = [Matrix::zeros(); 2];
+    ContactLoads { wrenches, stress, stress_of_friction, looseness: 1.0 }
 }
 
 /// The largest offset of the paths that turn so, by step.
