@@ -129,7 +129,9 @@ impl<const D: usize> Coulomb<'_, D> {
             least = least.min(change_size);
             let next = anderson.next(flat(&asked), change);
             for (k, (force, next)) in forces.iter_mut().zip(next.chunks_exact(D + 1)).enumerate() {
-                let contact = self.admitted(&self.touches[k], &Vector::from_column_slice(&next[..D]));
+                let (touch, contact) = (&self.touches[k], Vector::from_column_slice(&next[..D]));
+                let pressing = touch.normal.dot(&contact);
+                let contact = self.admitted(touch, pressing, touch.across(&contact));
                 *force = PairForce { contact, excess: next[D] };
             }
         }
@@ -171,13 +173,12 @@ impl<const D: usize> Coulomb<'_, D> {
             asked = pressing + force.excess - (gap - touch.floor) / yielding - excess;
         }
         let tangential = touch.across(&force.contact) - slip / across;
-        PairForce { contact: self.admitted(touch, &(touch.normal * asked + tangential)), excess }
+        PairForce { contact: self.admitted(touch, asked, tangential), excess }
     }
 
     /// The nearest force within the cone, its normal part first.
-    fn admitted(&self, touch: &Touch<D>, force: &Vector<D>) -> Vector<D> {
-        let pressing = touch.normal.dot(force).max(touch.least);
-        let tangential = touch.across(force);
+    fn admitted(&self, touch: &Touch<D>, pressing: f64, tangential: Vector<D>) -> Vector<D> {
+        let pressing = pressing.max(touch.least);
         let most = self.params.friction.most(pressing, self.rate);
         let size = tangential.norm();
         let share = if size > most { most / size } else { 1.0 };
