@@ -80,8 +80,8 @@ fn the_flow_answers_as_to_given_forces() {
     }
 }
 
-/// Shear presses two spheres together that repel each other, in steps in which repulsion alone would take them
-/// apart by several of its ranges: the order in the step is two.
+/// Shear presses two spheres together that repel each other, in steps in which repulsion alone would take
+/// them apart by several of its ranges: the order in the step is two.
 #[test]
 fn steps_are_longer_than_repulsion_is_stiff() {
     let ends = [0.1, 0.05, 0.025, 0.0125].map(|step| {

@@ -18,29 +18,38 @@ pub enum GapError {
     Contact(#[from] ContactError),
 }
 
+/// Films of a step.
+#[derive(Debug)]
+pub struct StepFilms<'a, const D: usize> {
+    /// Memory before the step, then that after it.
+    pub memory: &'a mut FilmMemory,
+    /// Films where particles are at the beginning of the step.
+    pub near: &'a [Film<D>],
+}
+
 /// Corrects `twists`, those of a flow with the forces of contacts: first for the forces with which no film is
-/// thinner than its contact allows, then so that films have the gaps that their impulses give. The memory is that
-/// before the step, then that after it.
+/// thinner than its contact allows, then so that films have the gaps that their impulses give.
 ///
 /// # Errors
 /// [`GapError`]; the memory is as before then, the twists are of no use.
 pub fn correct_gaps<const D: usize>(
     contact: &mut dyn FlowForces<D>,
-    (memory, films): (&mut FilmMemory, &[Film<D>]),
+    films: StepFilms<'_, D>,
     step: &BodyStep<'_, D>,
     mobility: &mut dyn TwistMobility<D>,
     twists: &mut [Twist<D>],
 ) -> Result<(FlowContactReport, FilmReport), GapError> {
+    let StepFilms { memory, near } = films;
     let standing =
         |film: &Film<D>| memory.standing_gap(step, film, contact.smallest_gap(film.pair, step.radii));
-    let standing = films.iter().map(standing).collect();
+    let standing = near.iter().map(standing).collect();
     contact.set_standing_gaps(standing);
     let report = contact.correct(step, mobility, twists)?;
     let floor = |pair| {
         let is_pressed = contact.forces().binary_search_by_key(&pair, |force| force.pair).is_ok();
         Floor { gap: contact.smallest_gap(pair, step.radii), is_pressed }
     };
-    let of_films = memory.open_above(step, films, &floor, twists)?;
+    let of_films = memory.open_above(step, near, &floor, twists)?;
     contact.measure_gaps(step, twists)?;
     Ok((report, of_films))
 }

@@ -77,14 +77,14 @@ pub use gluey_geom as geom;
 
 pub use domain::{Domain, Wall};
 pub use error::ContactError;
-pub use films::{Film, FilmError, FilmMemory, FilmReport, Floor, GapReport, StandingGap, film_reach};
+pub use films::{Film, FilmError, FilmMemory, FilmReport, Floor, GapReport, film_reach};
 pub use flow_contact::{FlowContact, FlowContactParams, Friction, NormalLaw};
-pub use gaps::{GapError, correct_gaps};
+pub use gaps::{GapError, StepFilms, correct_gaps};
 pub use key::{PairKey, Partner};
 pub use memory::{ContactState, ForceState, MemoryError, PairState};
 pub use mobility::{LoneDrag, Mobility, StokesDrag, TwistMobility, WithFixed};
 pub use model::{
-    BodyStep, Contact, ContactForce, ContactModel, ContactReport, FlowContactReport, FlowForces,
+    BodyStep, Contact, ContactForce, ContactModel, ContactReport, FlowContactReport, FlowForces, StandingGap,
     StepGeometry, WorstPair,
 };
 pub use network::{Cluster, Clusters, ContactArm, ContactNetwork, Coordination};

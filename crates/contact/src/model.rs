@@ -5,9 +5,7 @@ use gluey_geom::{Matrix, Pose, Twist, Vector, Wrench};
 use serde::{Deserialize, Serialize};
 
 use crate::projection::Effort;
-use crate::{
-    ContactError, ContactState, Domain, MemoryError, PairKey, Repulsion, StandingGap, TwistMobility, Wall,
-};
+use crate::{ContactError, ContactState, Domain, MemoryError, PairKey, Repulsion, TwistMobility, Wall};
 
 /// The step `x^{n+1} = x^n + c u^n + drift` whose velocities are to be corrected. One entry per particle.
 #[derive(Clone, Copy, Debug)]
@@ -123,8 +121,9 @@ pub trait FlowForces<const D: usize> {
     /// Those of pairs that are not there.
     fn loads(&mut self, step: &BodyStep<'_, D>) -> Result<Vec<Wrench<D>>, ContactError>;
 
-    /// Corrects `twists`, those of a flow in which the forces of the last [`FlowForces::loads`] act, so that no gap is below the smallest one
-    /// at the end of the step, with the forces that this takes in this mobility.
+    /// Corrects `twists`, those of a flow in which the forces of the last [`FlowForces::loads`] act, so that
+    /// no gap is below the smallest one at the end of the step, with the forces that this takes in this
+    /// mobility.
     ///
     /// # Errors
     /// [`ContactError`]; twists and forces are as before then.
@@ -143,6 +142,18 @@ pub trait FlowForces<const D: usize> {
 
     /// Ends a step: remembers what its last correction found.
     fn finish(&mut self);
+}
+
+/// Gap of a film as seen along a straight line: `g + (I - Phi(g)) / R(g)` of an impulse `I`, with the gap `g`
+/// at the beginning of the step. What the velocities of the step add to it is linear.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct StandingGap {
+    /// The two sides.
+    pub pair: PairKey,
+    /// At the end of a step in which the two stand still against each other.
+    pub gap: f64,
+    /// Where they touch.
+    pub floor: f64,
 }
 
 /// The force of a contact.

@@ -85,7 +85,7 @@ impl PairMobility {
     }
 }
 
-/// Where two spheres are.
+/// Configuration of two spheres.
 struct PairAt<'a> {
     particles: [&'a Particle<3>; 2],
     /// From the centre of the first to that of the second, and its direction.

@@ -15,8 +15,9 @@
 //! limit of a vanishing viscosity a gap is closed as long as `gamma < 0`. Here that limit is met where a film
 //! is thinner than positions resolve.
 //!
-//! Rough surfaces touch at a gap `g_0`. Their contact force is found with the velocities ([`crate::FlowContact`]),
-//! as the one with which `I = Phi(g_0)`; a film is at `g_0` then, for which `Phi` falls there without bound.
+//! Rough surfaces touch at a gap `g_0`. Their contact force is found with the velocities
+//! ([`crate::FlowContact`]), as the one with which `I = Phi(g_0)`; a film is at `g_0` then, for which `Phi`
+//! falls there without bound.
 //!
 //! Only the shape of `R` matters, not its scale: over the drag of two particles against each other, `A/2` in
 //! the units of contact, it is `s (rho(g) - rho(G))` for `g < G`, and next to nothing beyond, with
@@ -35,7 +36,7 @@ use gluey_geom::Twist;
 #[cfg(feature = "serde")]
 use serde::{Deserialize, Serialize};
 
-use crate::{BodyStep, ContactReport, ContactState, PairKey, PairState};
+use crate::{BodyStep, ContactReport, ContactState, PairKey, PairState, StandingGap};
 
 /// Films push a particle at most so many of its radii in a step. They are known up to gaps of three radii
 /// beyond what the flow closes, so that no two can meet that were not known to be near.
@@ -62,18 +63,6 @@ const MOST_PUSHED: f64 = 1.0;
 #[derive(Clone, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(Serialize, Deserialize))]
 pub struct FilmMemory(ContactState);
-
-/// Gap of a film as seen along a straight line: `g + (I - Phi(g)) / R(g)` of an impulse `I`, with the gap `g` at
-/// the beginning of the step. What the velocities of the step add to it is linear.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct StandingGap {
-    /// The two sides.
-    pub pair: PairKey,
-    /// At the end of a step in which the two stand still against each other.
-    pub gap: f64,
-    /// Where they touch.
-    pub floor: f64,
-}
 
 /// Gap at which the surfaces of a pair touch.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]

@@ -12,8 +12,8 @@ use crate::{BodyStep, PairState};
 const PUSHED: f64 = 0.5;
 
 /// Displacements of the particles, beside the `free` ones, with which films have the gaps that the impulses
-/// of `states` give, as far as these agree and surfaces do not touch at the gaps `floors`; puts there what the
-/// films have in the end.
+/// of `states` give, as far as these agree and surfaces do not touch at the gaps `floors`; puts there what
+/// the films have in the end.
 ///
 /// # Errors
 /// [`FilmError`].

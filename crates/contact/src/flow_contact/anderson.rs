@@ -1,6 +1,8 @@
 //! Anderson's acceleration of iterations (Anderson 1965, 10.1145/321296.321305; Walker and Ni 2011,
 //! 10.1137/10078356X).
 
+use gluey_geom::{Dim, Twist, Vector};
+
 /// The last steps of an iteration `x -> T(x)`.
 #[derive(Clone, Debug)]
 pub struct Anderson {
@@ -23,6 +25,20 @@ impl Anderson {
     pub fn restart(&mut self) {
         self.images.clear();
         self.residuals.clear();
+    }
+
+    /// The same for motions.
+    pub fn next_twists<const D: usize>(&mut self, twists: &mut [Twist<D>], residual: Vec<f64>) {
+        let numbers = |twist: &Twist<D>| {
+            let spin = Dim::<D>::spin_slice(&twist.spin).to_vec();
+            twist.velocity.iter().copied().chain(spin).collect::<Vec<f64>>()
+        };
+        let next = self.next(twists.iter().flat_map(numbers).collect(), residual);
+        let rigid = Dim::<D>::RIGID;
+        for (twist, numbers) in twists.iter_mut().zip(next.chunks_exact(rigid)) {
+            twist.velocity = Vector::from_column_slice(&numbers[..D]);
+            (D..rigid).for_each(|k| twist.spin[k - D] = numbers[k]);
+        }
     }
 
     /// Where to go on: the combination of the images whose combined residual is the smallest, with weights

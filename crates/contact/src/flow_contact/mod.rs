@@ -15,13 +15,14 @@
 
 mod anderson;
 mod near;
+mod pair_repulsion;
 mod params;
 mod solve;
 mod touch;
 
 use std::f64::consts::PI;
 
-use gluey_geom::{Dim, Matrix, Twist, Vector, Wrench};
+use gluey_geom::{Matrix, Twist, Vector, Wrench};
 
 use crate::memory::GammaRule;
 use crate::model::validate;
@@ -58,7 +59,8 @@ pub struct FlowContact<const D: usize> {
     centers: Centers<D>,
     forces: Vec<ContactForce<D>>,
     repulsion: Option<Repulsion>,
-    /// Forces by which pairs repelled each other in the last step, and in that of the last correction, sorted.
+    /// Forces by which pairs repelled each other in the last step, and in that of the last correction,
+    /// sorted.
     repelled: [Vec<(PairKey, f64)>; 2],
     /// Those that act in the last flow.
     in_flow: Vec<ContactForce<D>>,
@@ -169,20 +171,10 @@ impl<const D: usize> FlowContact<D> {
     /// From the third flow on, goes on from a combination of the motions without forces.
     fn accelerate(&mut self, step: &BodyStep<'_, D>, free: &mut [Twist<D>]) {
         let Some(before) = &self.free else { return };
-        let numbers = |twist: &Twist<D>| {
-            let spin = Dim::<D>::spin_slice(&twist.spin).to_vec();
-            twist.velocity.iter().copied().chain(spin).collect::<Vec<f64>>()
-        };
-        let image: Vec<f64> = free.iter().flat_map(numbers).collect();
         let change: Vec<Twist<D>> = free.iter().zip(before).map(|(free, before)| *free - *before).collect();
         let touches = self.forces.iter().filter_map(|force| self.touch(force.pair, step).ok());
         let residual: Vec<Vector<D>> = touches.map(|touch| touch.velocity(&change) - touch.slide).collect();
-        let next = self.acceleration.next(image, residual.iter().flatten().copied().collect());
-        let rigid = Dim::<D>::RIGID;
-        for (twist, numbers) in free.iter_mut().zip(next.chunks_exact(rigid)) {
-            twist.velocity = Vector::from_column_slice(&numbers[..D]);
-            (D..rigid).for_each(|k| twist.spin[k - D] = numbers[k]);
-        }
+        self.acceleration.next_twists(free, residual.iter().flatten().copied().collect());
     }
 
     /// The pairs that are near, with the forces that keep them apart, and the motions with these.

@@ -34,8 +34,8 @@ impl<const D: usize> NearPairs<D> {
         all.filter(|part| *part.1).map(|(part, _)| part)
     }
 
-    /// Lets pairs take part whose gaps these motions take below the roughness, or that repel each other; tells
-    /// whether there are any.
+    /// Lets pairs take part whose gaps these motions take below the roughness, or that repel each other;
+    /// tells whether there are any.
     fn admit(&mut self, step: &BodyStep<'_, D>, twists: &[Twist<D>]) -> bool {
         let (mut is_any, resolution) = (false, resolution(step));
         for (touch, takes_part) in self.touches.iter().zip(&mut self.takes_part) {

@@ -6,9 +6,9 @@
 //! `F_n <- max(0, F_n - (g - g_0) / (c d_n))`, `F_t <- P(F_t - v_t / d_t)`, `|P| <= mu max(0, F_n - F_c)`,
 //!
 //! with the gap `g` at the end of the step, the smallest gap `g_0` and the slip `v_t`. A fixed point is a
-//! solution, exact in the gaps. Where the two repel each other, that force and the one of the contact are found
-//! together, for both follow from the gap. In a mobility with films between the pairs `d` is close to the inverse of `B
-//! M B^T`, so that steps are few; [`Anderson`]'s acceleration makes them fewer.
+//! solution, exact in the gaps. Where the two repel each other, that force and the one of the contact are
+//! found together, for both follow from the gap. In a mobility with films between the pairs `d` is close to
+//! the inverse of `B M B^T`, so that steps are few; [`Anderson`]'s acceleration makes them fewer.
 
 use gluey_geom::{Twist, Vector, Wrench};
 
@@ -37,7 +37,7 @@ pub(super) struct Coulomb<'a, const D: usize> {
     pub free: &'a [Twist<D>],
 }
 
-/// What the partner of a pair feels.
+/// Force on the partner of a pair.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct PairForce<const D: usize> {
     /// The force of their contact.

@@ -188,8 +188,8 @@ fn forces_survive_a_checkpoint() {
     assert!(other.resume(state).is_err());
 }
 
-/// Two spheres that run at each other are held apart by repulsion with the gap at the end, or, where it is too
-/// weak, by it and the contact.
+/// Two spheres that run at each other are held apart by repulsion with the gap at the end, or, where it is
+/// too weak, by it and the contact.
 #[test]
 fn repulsion_and_contact_share_a_push() {
     let encounter = Encounter::new();

@@ -2,7 +2,7 @@
 
 use gluey_geom::{Dim, Twist, Vector, Wrench};
 
-use crate::repulsion::PairRepulsion;
+use super::pair_repulsion::PairRepulsion;
 use crate::{BodyStep, Domain, PairKey, Partner, Repulsion, StandingGap};
 
 /// A pair where it is at the beginning of a step.
@@ -11,7 +11,8 @@ pub(super) struct Touch<const D: usize> {
     pub pair: PairKey,
     /// From the particle to its partner, of length one.
     pub normal: Vector<D>,
-    /// The smallest gap that roughness leaves, in a film as [`StandingGap`] has it; minus infinity where surfaces do not touch.
+    /// The smallest gap that roughness leaves, in a film as [`StandingGap`] has it; minus infinity where
+    /// surfaces do not touch.
     pub floor: f64,
     /// How the two repel each other.
     pub repulsion: Option<PairRepulsion<D>>,

@@ -2,7 +2,7 @@
 
 use gluey_contact::{
     BodyStep, ContactError, Film, FilmMemory, FilmReport, FlowContactParams, FlowContactReport, FlowForces,
-    GapError, GapReport, TwistMobility, correct_gaps, film_reach,
+    GapError, GapReport, StepFilms, TwistMobility, correct_gaps, film_reach,
 };
 use gluey_geom::{Particle, Twist};
 use gluey_motion::{Configuration, ContactLoads, Hydrodynamics, Integrator, NoForces, Prediction};
@@ -184,7 +184,8 @@ impl<const D: usize> ContactIteration<'_, D> {
         let near = std::mem::take(&mut self.films);
         let corrected = self.with_step(|contact, mobility, step| {
             let mut twists = flow.to_vec();
-            let (report, of_films) = correct_gaps(contact, (&mut films, &near), step, mobility, &mut twists)?;
+            let of_step = StepFilms { memory: &mut films, near: &near };
+            let (report, of_films) = correct_gaps(contact, of_step, step, mobility, &mut twists)?;
             Ok((twists, report, of_films))
         });
         self.films = near;

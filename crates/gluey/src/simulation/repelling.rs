@@ -1,4 +1,5 @@
-//! Repulsion in a simulation: forces on the particles where they are, their stress, and what a step has beyond.
+//! Repulsion in a simulation: forces on the particles where they are, their stress, and what a step has
+//! beyond.
 
 use gluey_contact::{
     BodyStep, ContactError, ContactModel, ContactState, Domain, FlowContact, FlowContactParams, FlowForces,

@@ -2,7 +2,7 @@
 
 use gluey_contact::{
     BodyStep, ContactModel, Domain, FilmMemory, FlowContact, FlowContactParams, FlowForces, Friction,
-    GapError, NormalLaw, correct_gaps, film_reach,
+    GapError, NormalLaw, StepFilms, correct_gaps, film_reach,
 };
 use gluey_geom::{Matrix, Particle, Twist, Vector, Wrench};
 use gluey_motion::{
@@ -134,7 +134,7 @@ impl Encounter {
             let mut next = |prediction: &gluey_motion::Prediction<3>| {
                 (twists, after) = (prediction.twists.clone(), films.clone());
                 let corrected: Result<_, GapError> = integrator.with_step(*step, particles, |step| {
-                    let known = (&mut after, &near[..]);
+                    let known = StepFilms { memory: &mut after, near: &near };
                     let (report, _) = correct_gaps(contact, known, step, &mut *mobility, &mut twists)?;
                     Ok((report.change, contact.loads(step)?))
                 });
