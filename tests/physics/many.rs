@@ -25,7 +25,7 @@ fn output_of(count: usize) -> (u64, u64, f64) {
     let domain = Domain::periodic(&Vector::repeat(packing.side));
     let mut particles: Vec<_> = packing.positions.iter().map(|&x| Particle::new(x, 0.5)).collect();
     let twists = vec![Twist { velocity: Vector::zeros(), spin: Spin::<3>::new(0.0, 0.0, -0.5) }; count];
-    let mut writer = CsvWriter::create::<3>(&folder.path().join("t.csv"), count).expect("files");
+    let mut writer = CsvWriter::create::<3>(&folder.path().join("t.csv"), count, false).expect("files");
     let mut fastest = f64::INFINITY;
     for step in 0..=STEP_COUNT {
         let row = TrajectoryRow {

@@ -76,6 +76,7 @@ fn frame_of<const D: usize>(fields: &Fields<D>) -> VtkFrame<D> {
         particles: vec![],
         twists: vec![],
         contacts: vec![],
+        in_flow: None,
         domain: Domain::default(),
         in_box: None,
         fields: Some(fields.clone()),
@@ -197,6 +198,7 @@ fn every_encoding_reads_back() {
             particles: particles.clone(),
             twists: twists.clone(),
             contacts: vec![],
+            in_flow: None,
             domain: Domain::default(),
             in_box: None,
             fields: None,
@@ -242,6 +244,7 @@ fn particles_and_contacts() {
         particles: particles.clone(),
         twists: twists.to_vec(),
         contacts: contacts.to_vec(),
+        in_flow: None,
         domain: Domain::default(),
         in_box: None,
         fields: None,
@@ -285,6 +288,7 @@ fn contacts_with_walls_and_images() {
         particles: particles.to_vec(),
         twists: vec![Twist::default(); 2],
         contacts: contacts.to_vec(),
+        in_flow: None,
         domain,
         in_box: None,
         fields: None,
@@ -315,7 +319,8 @@ fn a_sheared_box_is_shown_whole() {
     let contacts = [Contact { pair: PairKey::across(0, 1, [-5, 2, 0]), lambda: 1.0, gamma: 0.0, gap: 0.0 }];
     let mut writer = VtkWriter::create(folder.path(), &[]).expect("a folder");
     let (particles, twists, contacts) = (particles.to_vec(), twists.to_vec(), contacts.to_vec());
-    let frame = VtkFrame { step: 0, time: 0.0, particles, twists, contacts, domain, in_box, fields: None };
+    let frame =
+        VtkFrame { step: 0, time: 0.0, particles, twists, contacts, in_flow, domain, in_box, fields: None };
     writer.write(&frame).expect("files");
 
     let near = |found: &[f64], exact: &[f64]| {

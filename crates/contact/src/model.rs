@@ -172,6 +172,10 @@ pub struct ContactForce<const D: usize> {
     pub slip: Vector<D>,
     /// Gap at the end of the step.
     pub gap: f64,
+    /// The smallest gap that roughness leaves.
+    pub floor: f64,
+    /// Whether the tangential force is all that the normal one allows: the surfaces slip. Else they stick.
+    pub slides: bool,
 }
 
 impl<const D: usize> ContactForce<D> {

@@ -27,6 +27,18 @@ pub struct RheologyMeans {
     pub viscosity: Option<Mean>,
     /// The same by the power of the shear.
     pub viscosity_by_dissipation: Option<Mean>,
+    /// Share of contacts in the first, where they act in the flow.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub viscosity_of_contacts: Option<Mean>,
+    /// That of their tangential forces alone.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub viscosity_of_friction: Option<Mean>,
+    /// Contacts of a particle that stick, where they act in the flow.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub sticking_contacts: Option<Mean>,
+    /// Those that slide.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub sliding_contacts: Option<Mean>,
     /// First normal stress difference.
     #[serde(rename = "N1")]
     pub n1: Option<Mean>,
@@ -76,12 +88,17 @@ impl RheologyMeans {
             let kept = values?[skipped..].iter().copied().filter(|value| value.is_finite());
             Mean::of(&kept.collect::<Vec<f64>>())
         };
+        let in_flow = |name| mean(table.find("viscosity_of_friction").and(table.find(name)));
         Ok(Some(Self {
             row_count: t.len(),
             skipped,
             strain_skipped,
             viscosity: mean(Some(viscosity)),
             viscosity_by_dissipation: mean(table.find("viscosity_by_dissipation")),
+            viscosity_of_contacts: in_flow("viscosity_of_contacts"),
+            viscosity_of_friction: in_flow("viscosity_of_friction"),
+            sticking_contacts: in_flow("sticking_contacts"),
+            sliding_contacts: in_flow("sliding_contacts"),
             n1: mean(Some(table.column("N1")?)),
             n2: mean(table.find("N2")),
             particle_pressure: mean(Some(table.column("particle_pressure")?)),
@@ -93,6 +110,10 @@ impl RheologyMeans {
         let all = [
             ("relative viscosity", self.viscosity),
             ("the same by dissipation", self.viscosity_by_dissipation),
+            ("share of contacts", self.viscosity_of_contacts),
+            ("share of friction", self.viscosity_of_friction),
+            ("sticking contacts", self.sticking_contacts),
+            ("sliding contacts", self.sliding_contacts),
             ("N1", self.n1),
             ("N2", self.n2),
             ("particle pressure", self.particle_pressure),

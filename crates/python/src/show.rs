@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use std::str::FromStr;
 
 use gluey_view::{
-    AnalyseOptions, AnimationOptions, Coloring, FlowOptions, FrameChoice, Look, PlotOptions, Quantity,
+    AnalyseOptions, AnimationOptions, Coloring, FlowOptions, FrameChoice, Lines, Look, PlotOptions, Quantity,
     SliceChoice, ViewOptions, Viewpoint,
 };
 use pyo3::exceptions::PyValueError;
@@ -25,7 +25,7 @@ pub struct PlotRequest {
     slice: Option<String>,
     view: (f64, f64),
     colour: String,
-    contacts: Option<f64>,
+    contacts: Option<String>,
     animation: bool,
     pixels: u32,
     rate: f64,
@@ -42,7 +42,7 @@ pub fn plot(py: Python<'_>, plot: PlotRequest) -> PyResult<Vec<PathBuf>> {
     let look = Look {
         viewpoint: Viewpoint { azimuth, elevation },
         coloring: named::<Coloring>("colour", &plot.colour)?,
-        network: plot.contacts,
+        network: plot.contacts.map(|lines| named::<Lines>("contacts", &lines)).transpose()?,
     };
     let options = PlotOptions {
         folder: plot.folder,

@@ -20,8 +20,9 @@ mod tables;
 
 use std::path::{Path, PathBuf};
 
+use gluey::ResultPaths;
 use gluey::output::product_names::is_table;
-use gluey::output::{FileError, prepare_folder_of, rows_of, write_atomically};
+use gluey::output::{FileError, prepare_folder_of, write_atomically};
 use gluey::rheology::{RheologyError, RheologyMeans};
 use gluey_contact::ContactError;
 use gluey_suspension::statistics::mser;
@@ -29,7 +30,7 @@ use thiserror::Error;
 
 pub use summary::StructureSummary;
 
-use crate::frames::{FramesError, dimension, frame_files, read_frames};
+use crate::frames::{FramesError, dimension, frame_files, read_frames, table_beside};
 use observe::{Distributions, FrameNumbers};
 
 /// Options of an analysis.
@@ -115,21 +116,14 @@ fn analyse_in<const D: usize>(
     };
     let distributions = Distributions::of(kept);
     let begin = options.skip.map(|_| kept[0].time);
-    let rheology = rheology_beside(&files[0]).map(|table| RheologyMeans::read(&table, begin)).transpose()?;
+    let rheology = table_beside(&files[0], ResultPaths::rheology)
+        .map(|table| RheologyMeans::read(&table, begin))
+        .transpose()?;
     let summary = StructureSummary::of(&series, skip, &distributions, rheology.flatten());
     let out = options.out.as_deref().unwrap_or(&options.folder);
     write(out, &tables::all(&series, &distributions))?;
     write(out, &[("summary.txt", summary.to_string())])?;
     Ok(summary)
-}
-
-/// Where a run whose frames are in `<name>-<label>` has its rheology, if it has any.
-fn rheology_beside(frame: &Path) -> Option<PathBuf> {
-    let folder = std::path::absolute(frame).ok()?.parent()?.to_owned();
-    let name = folder.file_name()?.to_str()?;
-    let runs = name.rmatch_indices('-').map(|(end, _)| &name[..end]);
-    let tables = runs.map(|run| folder.with_file_name(format!("{run}-rheology.csv")));
-    tables.into_iter().find(|table| rows_of(table).is_some())
 }
 
 fn write(folder: &Path, files: &[(&str, String)]) -> Result<(), FileError> {

@@ -2,8 +2,10 @@
 
 use std::path::{Path, PathBuf};
 
+use gluey::ResultPaths;
 use gluey::output::xyz::{self, XyzError, XyzFrame, read_text};
-use gluey::output::{FileError, entries, name_of};
+use gluey::output::{FileError, entries, name_of, rows_of};
+use gluey::table::TableError;
 use thiserror::Error;
 
 /// Frames could not be found or read.
@@ -44,6 +46,15 @@ pub enum FramesError {
         /// The first frame.
         first: PathBuf,
     },
+    /// A table of their run is none, or lacks a column.
+    #[error("{}: {source}", path.display())]
+    Table {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong.
+        #[source]
+        source: TableError,
+    },
     /// A frame could not be read.
     #[error(transparent)]
     Frame(#[from] XyzError),
@@ -69,6 +80,14 @@ pub fn frame_files(folder: &Path) -> Result<Vec<PathBuf>, FramesError> {
         return Err(FramesError::None { folder: folder.to_owned() });
     }
     Ok(found)
+}
+
+/// Where a run whose frames are in `<name>-<label>` has this table, if it has any.
+pub fn table_beside(frame: &Path, table: fn(&ResultPaths) -> PathBuf) -> Option<PathBuf> {
+    let folder = std::path::absolute(frame).ok()?.parent()?.to_owned();
+    let (beside, name) = (folder.parent()?, folder.file_name()?.to_str()?);
+    let runs = name.rmatch_indices('-').map(|(end, _)| ResultPaths::new(beside, &name[..end]));
+    runs.map(|run| table(&run)).find(|table| rows_of(table).is_some())
 }
 
 /// Sorted by the length of the names first, so that steps are in order however many digits they have.

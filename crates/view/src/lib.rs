@@ -16,6 +16,7 @@
 //! Not for pictures of other numbers than a run of gluey wrote: `gluey_pictures` draws any.
 
 mod analyse;
+mod contacts;
 mod frames;
 mod plot;
 mod view;
@@ -23,7 +24,7 @@ mod view;
 pub use analyse::{AnalyseError, AnalyseOptions, StructureSummary, analyse};
 pub use frames::FramesError;
 pub use plot::{
-    AnimationOptions, Coloring, Figure, FlowOptions, FrameChoice, Look, PictureFormat, PlotError,
+    AnimationOptions, Coloring, Figure, FlowOptions, FrameChoice, Lines, Look, PictureFormat, PlotError,
     PlotOptions, Quantity, SliceChoice, Viewpoint, plot,
 };
 pub use view::{ViewError, ViewOptions, Viewed, view};

@@ -43,7 +43,7 @@ pub use animation::AnimationOptions;
 pub use error::PlotError;
 pub use figure::Figure;
 pub use flow::{FlowOptions, Quantity, SliceChoice};
-pub use look::{Coloring, Look, Viewpoint};
+pub use look::{Coloring, Lines, Look, Viewpoint};
 pub use snapshot::FrameChoice;
 
 use read::{Results, StructureTables};

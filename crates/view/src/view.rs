@@ -12,6 +12,7 @@ use gluey::output::{FileError, name_of, prepare_folder_of, write_atomically};
 use serde::Serialize;
 use thiserror::Error;
 
+use crate::contacts::{FrameContact, contacts_of};
 use crate::frames::FramesError;
 use crate::frames::{dimension, frame_files, read_frames};
 
@@ -59,8 +60,8 @@ pub fn view(options: &ViewOptions) -> Result<Viewed, ViewError> {
     let title = title(&files[0]);
     let files: Vec<PathBuf> = files.into_iter().step_by(options.every.max(1)).collect();
     let run = match dimension(&files)? {
-        2 => PageRun::of(title, &read_frames::<2>(&files)?),
-        _ => PageRun::of(title, &read_frames::<3>(&files)?),
+        2 => PageRun::read::<2>(title, &files)?,
+        _ => PageRun::read::<3>(title, &files)?,
     };
     let page = options.out.clone().unwrap_or_else(|| options.folder.join(PAGE_NAME));
     let text = run.page();
@@ -102,22 +103,28 @@ struct PageFrame {
     spins: Vec<f32>,
     /// Empty without a contact model.
     forces: Vec<f32>,
+    /// Of each contact the particle, its partner (-1 for a wall), the way to it, the normal force, and
+    /// whether it slides; nothing where they are not known.
+    contacts: Option<Vec<f32>>,
 }
 
 impl PageRun {
     /// All frames have the radii and the box of the first.
-    fn of<const D: usize>(title: String, frames: &[XyzFrame<D>]) -> Self {
+    fn read<const D: usize>(title: String, files: &[PathBuf]) -> Result<Self, FramesError> {
+        let frames = &read_frames::<D>(files)?[..];
+        let contacts = contacts_of(&files[0], frames)?;
+        let contacts = |n: usize| contacts.as_ref().map(|of_frames| numbers(&of_frames[n]));
         let (container, radii) = (&frames[0].container, &frames[0].radii);
         let bounds = container.bounds();
-        Self {
+        Ok(Self {
             title,
             dimension: D,
             origin: triple(bounds.lower.as_slice()),
             edges: triple(bounds.extent().as_slice()),
             periodic: std::array::from_fn(|d| d < D && !container.is_walled(d)),
             radii: radii.iter().map(|radius| *radius as f32).collect(),
-            frames: frames.iter().map(PageFrame::of).collect(),
-        }
+            frames: frames.iter().enumerate().map(|(n, frame)| PageFrame::of(frame, contacts(n))).collect(),
+        })
     }
 
     fn page(&self) -> String {
@@ -130,7 +137,7 @@ impl PageRun {
 }
 
 impl PageFrame {
-    fn of<const D: usize>(frame: &XyzFrame<D>) -> Self {
+    fn of<const D: usize>(frame: &XyzFrame<D>, contacts: Option<Vec<f32>>) -> Self {
         let flat = |vectors: &[gluey_geom::Vector<D>]| {
             vectors.iter().flat_map(|vector| triple(vector.as_slice())).collect::<Vec<f32>>()
         };
@@ -142,8 +149,19 @@ impl PageFrame {
             velocities: flat(&frame.velocities),
             spins: frame.spins.iter().flat_map(|spin| triple(spin)).collect(),
             forces: frame.contact_forces.as_deref().map_or_else(Vec::new, flat),
+            contacts,
         }
     }
+}
+
+fn numbers<const D: usize>(contacts: &[FrameContact<D>]) -> Vec<f32> {
+    let of_one = |contact: &FrameContact<D>| {
+        let [x, y, z] = triple(contact.arm.as_slice());
+        let partner = contact.second.map_or(-1.0, |second| second as f32);
+        let slides = f32::from(u8::from(contact.slides == Some(true)));
+        [contact.first as f32, partner, x, y, z, contact.force as f32, slides]
+    };
+    contacts.iter().flat_map(of_one).collect()
 }
 
 /// Three coordinates; the third of a plane is 0.

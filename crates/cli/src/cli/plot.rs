@@ -5,8 +5,8 @@ use std::path::PathBuf;
 
 use clap::Args;
 use gluey_view::{
-    AnimationOptions, Coloring, Figure, FlowOptions, FrameChoice, Look, PictureFormat, PlotOptions, Quantity,
-    SliceChoice, Viewpoint,
+    AnimationOptions, Coloring, Figure, FlowOptions, FrameChoice, Lines, Look, PictureFormat, PlotOptions,
+    Quantity, SliceChoice, Viewpoint,
 };
 
 use super::Failure;
@@ -48,9 +48,10 @@ pub struct PlotArguments {
     /// Colours of particles in frames and animations: speed, spin, gap (the smallest), or contact-force.
     #[arg(long, value_name = "WHAT", default_value = "speed", requires = "frames")]
     colour: Coloring,
-    /// Join the centres of particles with gaps up to this, in mean radii, in frames and animations.
-    #[arg(long, value_name = "GAP", value_parser = number(0.0..=10.0, "mean radii"), allow_negative_numbers = true, requires = "frames")]
-    contacts: Option<f64>,
+    /// Join the centres of particles in frames and animations: those with gaps up to this, in mean radii, or
+    /// by `force` those in contact, in lines as thick as their normal force, dashed where they slip.
+    #[arg(long, value_name = "GAP|force", allow_negative_numbers = true, requires = "frames")]
+    contacts: Option<Lines>,
     /// Animate the particles of all frames that were written with --xyz, as a GIF.
     #[arg(long, group = "frames")]
     animation: bool,

@@ -119,6 +119,13 @@ impl<const D: usize> FlowContact<D> {
         &self.params
     }
 
+    /// The forces of [`ContactModel::contacts`], one for each, over `6 pi eta`: pressing is their lambda.
+    pub fn forces_of_contacts(&self) -> Vec<ContactForce<D>> {
+        let is_contact = |pair| self.contacts.binary_search_by_key(&pair, |contact| contact.pair).is_ok();
+        let forces = self.forces.iter().filter(|one| is_contact(one.pair));
+        forces.map(|one| ContactForce { force: one.force / self.unit(), ..*one }).collect()
+    }
+
     /// Force of a `lambda` of one.
     fn unit(&self) -> f64 {
         6.0 * PI * self.params.viscosity
@@ -295,11 +302,12 @@ impl<const D: usize> FlowContact<D> {
             size += touch.power(force).max(touch.power(&before));
             let (most, held) =
                 (friction.most(touch.normal.dot(force), self.rate), touch.across(force).norm());
-            report.contact.sliding_count += usize::from(force.amax() > 0.0 && held >= (1.0 - AT_EDGE) * most);
             if force.amax() > 0.0 {
+                let slides = held >= (1.0 - AT_EDGE) * most;
+                report.contact.sliding_count += usize::from(slides);
                 let slip = touch.across(&touch.velocity(&outcome.twists));
-                let (pair, normal, branch) = (touch.pair, touch.normal, touch.branch());
-                forces.push(ContactForce { pair, normal, force: *force, branch, slip, gap });
+                let (pair, normal, branch, floor) = (touch.pair, touch.normal, touch.branch(), touch.floor);
+                forces.push(ContactForce { pair, normal, force: *force, branch, slip, gap, floor, slides });
             }
         }
         report.change = if change > 0.0 { (change / size).sqrt() } else { 0.0 };
@@ -467,6 +475,8 @@ impl<const D: usize> ContactModel<D> for FlowContact<D> {
             branch: Vector::zeros(),
             slip: Vector::zeros(),
             gap: 0.0,
+            floor: 0.0,
+            slides: false,
         };
         self.forces = std::mem::take(&mut state.in_flow).into_iter().map(force).collect();
         self.repelled[0] = std::mem::take(&mut state.repelled);

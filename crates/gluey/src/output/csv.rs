@@ -7,7 +7,8 @@
 //! on there is one column `min_gap_over_a`, the smallest gap of all pairs, and a second file
 //! `<stem>-gaps.csv` lists what is near: a row `t,i,j,gap_over_a,contact_force,repulsion_force,partner` for
 //! each gap of at most [`GAP_CUTOFF_OVER_A`]; forces are positive apart, those of contacts over `6 pi eta`,
-//! and empty where there is no such force in the run. Particles count from 1. The partner `j` is a
+//! and empty where there is no such force in the run. Where contacts act in the flow there are
+//! `friction_force,slip_speed,slides,roughness_over_a` before the partner, empty without a contact. Particles count from 1. The partner `j` is a
 //! `particle`, the nearest periodic `image` of one, or a `wall` (1 below, 2 above).
 
 use std::fmt::Write as _;
@@ -30,8 +31,15 @@ pub const MOST_WITH_PAIR_COLUMNS: usize = 9;
 
 const AXES: [char; 3] = ['x', 'y', 'z'];
 
-/// The first line of the file of near pairs.
-const GAPS_HEADER: &str = "t,i,j,gap_over_a,contact_force,repulsion_force,partner";
+/// The first line of the file of near pairs, where contacts act in the flow or not.
+fn gaps_header(acts_in_flow: bool) -> &'static str {
+    match acts_in_flow {
+        false => "t,i,j,gap_over_a,contact_force,repulsion_force,partner",
+        true => {
+            "t,i,j,gap_over_a,contact_force,repulsion_force,friction_force,slip_speed,slides,roughness_over_a,partner"
+        }
+    }
+}
 
 /// Writes rows as they come to `<path>.partial-K`, with the first `K` that no earlier run left, and gives the
 /// file its name when it is complete; the file of near pairs likewise.
@@ -42,11 +50,15 @@ pub struct CsvWriter {
 }
 
 impl CsvWriter {
-    /// Starts the files of a run of so many particles.
-    pub fn create<const D: usize>(path: &Path, particle_count: usize) -> Result<Self, RowsError> {
+    /// Starts the files of a run of so many particles, whose contacts act in the flow or not.
+    pub fn create<const D: usize>(
+        path: &Path,
+        particle_count: usize,
+        acts_in_flow: bool,
+    ) -> Result<Self, RowsError> {
         let rows = Draft::with_header(path, &header::<D>(particle_count))?;
         let gaps = gaps_path(path, particle_count);
-        let gaps = gaps.map(|path| Draft::with_header(&path, GAPS_HEADER)).transpose()?;
+        let gaps = gaps.map(|path| Draft::with_header(&path, gaps_header(acts_in_flow))).transpose()?;
         Ok(Self { rows, gaps })
     }
 
@@ -63,7 +75,7 @@ impl CsvWriter {
         let gaps = gaps_path(path, particle_count).zip(gaps);
         let mut gaps = gaps.map(|(path, mark)| Draft::resume(&path, mark)).transpose()?;
         if let Some(gaps) = &mut gaps {
-            gaps.visit(|line, text| line > 1 || text == GAPS_HEADER)?;
+            gaps.visit(|line, text| line > 1 || [false, true].map(gaps_header).contains(&text))?;
         }
         rows.visit(|line, text| match line {
             1 => text == header::<D>(particle_count),
@@ -77,7 +89,7 @@ impl CsvWriter {
     pub fn write<const D: usize>(
         &mut self,
         row: &TrajectoryRow<'_, D>,
-        forces: &PairForces<'_>,
+        forces: &PairForces<'_, D>,
     ) -> Result<Option<f64>, RowsError> {
         let a = row.mean_radius();
         let smallest = match &mut self.gaps {
@@ -168,7 +180,7 @@ fn gap_lines<const D: usize>(
     row: &TrajectoryRow<'_, D>,
     near: &[PairGap],
     cutoff: f64,
-    forces: &PairForces<'_>,
+    forces: &PairForces<'_, D>,
 ) -> String {
     let (a, time) = (row.mean_radius(), format!("{:.16e}", row.time));
     let of_contacts = ContactForces::of(forces);
@@ -177,12 +189,14 @@ fn gap_lines<const D: usize>(
     let mut add = |first: usize, second: usize, gap: f64, partner: &str| {
         let is_wall = partner == "wall";
         let radii = [radius(first), if is_wall { f64::INFINITY } else { radius(second) }];
-        let forces = [of_contacts.on((first, second, is_wall)), forces.repulsion::<D>(gap, radii)];
+        let pair = (first, second, is_wall);
+        let forces = [of_contacts.on(pair), forces.repulsion(gap, radii)];
+        let rubbing = of_contacts.cells_of_rubbing(pair, a);
         let [contact, repulsion] =
             forces.map(|force| force.map_or(String::new(), |force| format!("{force:.16e}")));
         let (i, j, gap) = (first + 1, second + 1, gap / a);
         // Writing to a string cannot fail.
-        let _ = writeln!(text, "{time},{i},{j},{gap:.16e},{contact},{repulsion},{partner}");
+        let _ = writeln!(text, "{time},{i},{j},{gap:.16e},{contact},{repulsion},{rubbing}{partner}");
     };
     for &PairGap { first, second, gap } in near {
         add(first, second, gap, if row.is_direct(first, second) { "particle" } else { "image" });
@@ -253,18 +267,18 @@ mod tests {
         let floor = Wall::new(&Vector::<2>::new(0.0, 1.0), &Vector::<2>::y());
         let domain = Domain::default().with_period(0, 30.5).with_wall(floor);
         let twists = vec![Twist::default(); 10];
-        let mut writer = CsvWriter::create::<2>(&path, 10).expect("files");
+        let mut writer = CsvWriter::create::<2>(&path, 10, false).expect("files");
         let row = TrajectoryRow { time: 0.5, particles: &particles, twists: &twists, domain: &domain };
         let contact = |pair, lambda| Contact { pair, lambda, gamma: 0.0, gap: 0.5 };
         let contacts = [contact(PairKey::across(0, 9, [-1, 0, 0]), 3.0), contact(PairKey::wall(0, 0), 7.0)];
         let repulsion = Repulsion { force: 2.0, range: 0.5, radius: 1.0 };
-        let forces = PairForces { contacts: Some(&contacts), repulsion: Some(repulsion) };
+        let forces = PairForces { contacts: Some(&contacts), in_flow: None, repulsion: Some(repulsion) };
         assert_eq!(writer.write(&row, &forces).expect("a row"), Some(0.5));
         writer.finish().expect("complete");
         let text = std::fs::read_to_string(folder.path().join("t-gaps.csv")).expect("near pairs");
         let lines: Vec<&str> = text.lines().collect();
         let half = "5.0000000000000000e-1";
-        assert_eq!(lines[0], GAPS_HEADER);
+        assert_eq!(lines[0], gaps_header(false));
         let shown = |x: f64| format!("{x:.16e}");
         let at = |gap: f64| shown(2.0 * (-gap / 0.5).exp());
         let [none, three, seven] = [0.0, 3.0, 7.0].map(shown);

@@ -8,16 +8,18 @@
 //! `viscosity_of_films`,
 //! `viscosity_of_contacts`, `viscosity_of_friction`, and `viscosity_of_repulsion` are the shares of films too
 //! thin for the mesh, of contacts, of their tangential forces alone, and of repulsion in the first; those of
-//! contacts are there where these act in the flow, and in 3D. `particle_pressure` is `-tr S / (D V)`,
+//! contacts are there where these act in the flow, and in 3D. `sticking_contacts` and `sliding_contacts` are
+//! those of a particle in the mean, where they act in the flow. `particle_pressure` is `-tr S / (D V)`,
 //! relative to the mean pressure of the fluid.
 
 use gluey_motion::MeanStress;
 
 use super::line_of;
 
-/// The first line in 3D where contacts act in the flow; elsewhere there is no share of friction. In 2D there
-/// is no `N2`, and forces of contacts have a unit of force in the flow only.
-const NAMES: [&str; 12] = [
+/// The first line in 3D where contacts act in the flow; elsewhere there is no share of friction, and contacts
+/// neither stick nor slide. In 2D there is no `N2`, and forces of contacts have a unit of force in the flow
+/// only.
+const NAMES: [&str; 14] = [
     "t",
     "strain",
     "viscosity",
@@ -29,6 +31,8 @@ const NAMES: [&str; 12] = [
     "N1",
     "N2",
     "particle_pressure",
+    "sticking_contacts",
+    "sliding_contacts",
     "min_gap_over_a",
 ];
 
@@ -41,6 +45,8 @@ pub struct Rheology<'a, const D: usize> {
     pub strain: f64,
     /// The stress.
     pub stress: &'a MeanStress<D>,
+    /// Contacts of a particle that stick and that slide, in the mean; where they act in the flow.
+    pub contacts_per_particle: Option<[f64; 2]>,
     /// Smallest gap in mean radii, if there is any.
     pub smallest_gap_over_a: Option<f64>,
     /// Time and shear rate, where the stress is given and the time above is the strain.
@@ -53,7 +59,7 @@ pub fn header<const D: usize>(is_at_given_stress: bool, acts_in_flow: bool) -> S
     let is_there = |name: &&str| match *name {
         "N2" => D == 3,
         "viscosity_of_contacts" => D == 3 || acts_in_flow,
-        "viscosity_of_friction" => acts_in_flow,
+        "viscosity_of_friction" | "sticking_contacts" | "sliding_contacts" => acts_in_flow,
         _ => true,
     };
     let more = if is_at_given_stress { &["time", "shear_rate"][..] } else { &[] };
@@ -73,7 +79,8 @@ pub fn line<const D: usize>(row: &Rheology<'_, D>) -> String {
     let shares = contacts.into_iter().chain(friction).chain([Some(stress.viscosity_of_repulsion())]);
     let normal = n1.into_iter().chain(n2).chain([stress.particle_pressure()]).map(Some);
     let more = row.time_and_rate.into_iter().flatten().map(Some);
-    let numbers = first.into_iter().chain(others).chain(shares).chain(normal);
+    let contacts = row.contacts_per_particle.into_iter().flatten().map(Some);
+    let numbers = first.into_iter().chain(others).chain(shares).chain(normal).chain(contacts);
     line_of(numbers.chain([row.smallest_gap_over_a]).chain(more), 16)
 }
 
@@ -104,6 +111,7 @@ mod tests {
             time: 1.0,
             strain: -0.5,
             stress: &stress,
+            contacts_per_particle: None,
             smallest_gap_over_a: Some(0.25),
             time_and_rate: None,
         };
@@ -115,10 +123,11 @@ mod tests {
         assert_eq!(numbers.len(), header::<3>(false, false).split(',').count());
         assert_eq!(header::<2>(false, false).split(',').count(), numbers.len() - 2);
         let rubbing = MeanStress { of_friction: Some(of_bodies * 0.25), work_of_contacts: -0.25, ..stress };
-        let line = self::line(&Rheology { stress: &rubbing, ..row });
+        let line = self::line(&Rheology { stress: &rubbing, contacts_per_particle: Some([0.5, 1.5]), ..row });
         let cells: Vec<&str> = line.trim_end().split(',').collect();
         assert_eq!(cells.len(), header::<3>(false, true).split(',').count());
         let [by_power, of_friction] = [cells[3], cells[6]].map(|cell| cell.parse::<f64>().expect("a number"));
+        assert_eq!(cells[11..13].iter().map(|cell| cell.parse()).collect(), Ok(vec![0.5, 1.5]), "{line}");
         assert!((by_power - 3.0).abs() + (of_friction - 0.375).abs() < 1e-14, "{line}");
         let stress = MeanStress { work_of_forces: 1.0, ..stress };
         let line = self::line(&Rheology { stress: &stress, ..row });

@@ -5,7 +5,8 @@
 //! nodes of quadratic cells), `particles` (a vertex each: radius, velocity, spin, number, where it is when
 //! nothing brings it back into a periodic box, whether it is an image) and `contacts` (a line for each
 //! contact, from centre to centre, to the centre of an image across a periodic border, or to the foot
-//! point on a wall: gamma, lambda, gap; and a vertex for every particle, so that the file is readable when
+//! point on a wall: gamma, lambda, gap, and where contacts act in the flow friction, slip, slides and
+//! roughness; and a vertex for every particle, so that the file is readable when
 //! nothing touches).
 //!
 //! Where ranks share the flow, each has its cells in a file of its own, and `.pvtu` files name those of a
@@ -23,7 +24,7 @@ mod xml;
 
 use std::path::{Path, PathBuf};
 
-use gluey_contact::{Contact, Domain, Partner};
+use gluey_contact::{Contact, ContactForce, Domain, Partner};
 use gluey_geom::{Dim, Particle, Spin, Twist, Vector};
 use gluey_motion::Fields;
 
@@ -56,6 +57,8 @@ pub struct VtkFrame<const D: usize> {
     pub twists: Vec<Twist<D>>,
     /// Contacts.
     pub contacts: Vec<Contact>,
+    /// Their forces over `6 pi eta`, one for each, where they act in the flow.
+    pub in_flow: Option<Vec<ContactForce<D>>>,
     /// Their walls and periods.
     pub domain: Domain<D>,
     /// The box that particles are shown in; where they are, if there is none.
@@ -217,12 +220,29 @@ fn contacts_piece<const D: usize>(frame: &VtkFrame<D>, balls: &[Shown<D>]) -> Gr
     let of_lines = |value: fn(&Contact) -> f64| -> Vec<f64> {
         std::iter::repeat_n(0.0, count).chain(contacts.iter().map(value)).collect()
     };
-    let of_cells = vec![
+    let mut of_cells = vec![
         scalars("gamma", of_lines(|contact| contact.gamma)),
         scalars("lambda", of_lines(|contact| contact.lambda)),
         scalars("gap", of_lines(|contact| contact.gap)),
     ];
+    of_cells.extend(frame.in_flow.iter().flat_map(|forces| rubbing(forces, count)));
     GridPiece { points: in_space(&points), connectivity, offsets, types, of_points: Vec::new(), of_cells }
+}
+
+/// Friction, slip and roughness of contacts, behind the zeros of so many vertices.
+fn rubbing<const D: usize>(forces: &[ContactForce<D>], count: usize) -> [Array; 4] {
+    let scalar = |value: fn(&ContactForce<D>) -> f64| -> Vec<f64> {
+        std::iter::repeat_n(0.0, count).chain(forces.iter().map(value)).collect()
+    };
+    let vector = |value: fn(&ContactForce<D>) -> Vector<D>| -> Vec<Vector<D>> {
+        std::iter::repeat_n(Vector::zeros(), count).chain(forces.iter().map(value)).collect()
+    };
+    [
+        vectors("friction", &vector(|one| one.tangential())),
+        vectors("slip", &vector(|one| one.slip)),
+        scalars("slides", scalar(|one| f64::from(u8::from(one.slides)))),
+        scalars("roughness", scalar(|one| one.floor)),
+    ]
 }
 
 /// A plane spin turns about z.

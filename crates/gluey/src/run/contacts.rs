@@ -1,8 +1,8 @@
 //! The model of contact in runs: of one process, or shared by ranks.
 
 use gluey_contact::{
-    BodyStep, Contact, ContactError, ContactModel, ContactNetwork, ContactParams, ContactReport,
-    ContactState, Domain, FlowContact, FlowForces, MemoryError, PairContact, Wall, WithFixed,
+    BodyStep, Contact, ContactError, ContactForce, ContactModel, ContactNetwork, ContactParams,
+    ContactReport, ContactState, Domain, FlowContact, FlowForces, MemoryError, PairContact, Wall, WithFixed,
 };
 use gluey_geom::{Particle, Twist, Vector};
 
@@ -18,9 +18,15 @@ pub(super) trait Surrounded<const D: usize>: ContactModel<D> {
     fn params(&self) -> &ContactParams;
 
     /// What acts between the particles of a case after the last step.
-    fn pair_forces(&self, case: &Case) -> PairForces<'_> {
+    fn pair_forces(&self, case: &Case) -> PairForces<'_, D> {
         let has_law = case.contact.strategy != Strategy::None;
-        PairForces { contacts: has_law.then(|| self.contacts()), repulsion: case.repulsion() }
+        let contacts = has_law.then(|| self.contacts());
+        PairForces { contacts, in_flow: self.forces_in_flow(), repulsion: case.repulsion() }
+    }
+
+    /// The forces of contacts after the last step over `6 pi eta`, one for each, where they act in the flow.
+    fn forces_in_flow(&self) -> Option<Vec<ContactForce<D>>> {
+        None
     }
 
     /// What is taken of the network of contacts between particles where they are now.
@@ -115,6 +121,13 @@ impl<const D: usize, P: Surrounded<D>> Surrounded<D> for CaseContact<D, P> {
         match self {
             Self::AfterFlow(model) => model.params(),
             Self::InFlow(_, params) => params,
+        }
+    }
+
+    fn forces_in_flow(&self) -> Option<Vec<ContactForce<D>>> {
+        match self {
+            Self::AfterFlow(_) => None,
+            Self::InFlow(model, _) => Some(model.forces_of_contacts()),
         }
     }
 }

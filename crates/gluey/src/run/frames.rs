@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use gluey_contact::ContactLaw;
+use gluey_contact::{ContactForce, ContactLaw};
 use gluey_geom::Vector;
 use gluey_parallel::Communicator;
 use gluey_suspension::Container;
@@ -156,6 +156,7 @@ impl<const D: usize> Frames<D> {
                         particles: particles.to_vec(),
                         twists: twists.to_vec(),
                         contacts: simulation.contacts().to_vec(),
+                        in_flow: simulation.contact().forces_in_flow(),
                         in_box: domain.is_periodic().then(shown),
                         domain,
                         fields: with_fields.then(|| simulation.fields()).flatten(),
@@ -203,12 +204,26 @@ where
     C: Surrounded<D>,
 {
     let contact = simulation.contact();
+    if let Some(forces) = contact.forces_in_flow() {
+        return Ok(Some(added_up(&forces, simulation.particles().len())));
+    }
     if contact.params().law == ContactLaw::None {
         return Ok(None);
     }
     let (step, time) = (simulation.step_index(), simulation.time());
     let forces = contact.of_network(simulation.particles(), |network| network.forces());
     Ok(Some(forces.map_err(|source| StepError::Contact { step, time, source })?))
+}
+
+/// The sum of forces on each of so many particles.
+fn added_up<const D: usize>(forces: &[ContactForce<D>], count: usize) -> Vec<Vector<D>> {
+    let mut sums = vec![Vector::zeros(); count];
+    for ContactForce { pair, force, .. } in forces {
+        let (first, second) = pair.particles();
+        sums[first] -= force;
+        second.into_iter().for_each(|second| sums[second] += force);
+    }
+    sums
 }
 
 /// The box as it is sheared now.

@@ -3,6 +3,7 @@
 
 use std::path::{Path, PathBuf};
 
+use gluey_contact::ContactReport;
 use gluey_motion::Hydrodynamics;
 
 use super::contacts::Surrounded;
@@ -54,6 +55,15 @@ fn paths(case: &Case, csv: &Path) -> [Option<PathBuf>; 2] {
     [case.has_rheology().then(|| paths.rheology()), case.gives_motions().then(|| paths.forces())]
 }
 
+/// Contacts of a particle that stick and that slide, in the mean, where there are no walls.
+fn contacts_per_particle<const D: usize, H: Hydrodynamics<D>, C: Surrounded<D>>(
+    simulation: &Simulation<D, H, C>,
+) -> [f64; 2] {
+    let ContactReport { active_count, sliding_count, .. } = simulation.gaps().contacts;
+    let sticking_count = active_count - sliding_count;
+    [sticking_count, sliding_count].map(|pairs| 2.0 * pairs as f64 / simulation.particles().len() as f64)
+}
+
 impl RunTables {
     /// Starts those that a case has.
     pub fn create<const D: usize>(case: &Case, csv: &Path) -> Result<Self, RowsError> {
@@ -62,7 +72,7 @@ impl RunTables {
         };
         let [rheology, forces] = paths(case, csv);
         Ok(Self {
-            trajectory: CsvWriter::create::<D>(csv, case.particles.len())?,
+            trajectory: CsvWriter::create::<D>(csv, case.particles.len(), case.acts_in_flow())?,
             rheology: create(
                 rheology,
                 rheology::header::<D>(case.shear_stress.is_some(), case.acts_in_flow()),
@@ -113,8 +123,14 @@ impl RunTables {
             let stress = with_contacts(*stress, simulation.contact(), particles)
                 .map_err(|source| StepError::Contact { step, time, source })?;
             let strain = simulation.strain();
-            let time_and_rate = simulation.time_and_rate();
-            let row = Rheology { time, strain, stress: &stress, smallest_gap_over_a, time_and_rate };
+            let row = Rheology {
+                time,
+                strain,
+                stress: &stress,
+                contacts_per_particle: case.acts_in_flow().then(|| contacts_per_particle(simulation)),
+                smallest_gap_over_a,
+                time_and_rate: simulation.time_and_rate(),
+            };
             rheology.write(&rheology::line(&row))?;
         }
         if let (Some(forces), Some(holding)) = (&mut self.forces, simulation.holding()) {

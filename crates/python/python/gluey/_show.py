@@ -19,7 +19,7 @@ def plot(
     slice: str | None = None,
     view: tuple[float, float] = (31.5, 20.0),
     colour: str = "speed",
-    contacts: float | None = None,
+    contacts: float | str | None = None,
     animation: bool = False,
     pixels: int = 720,
     rate: float = 12.0,
@@ -47,7 +47,8 @@ def plot(
     colour
         Colours of particles in frames and animations: ``speed``, ``spin``, the smallest ``gap``, or ``contact-force``.
     contacts
-        Join the centres of particles with gaps up to this, in mean radii, from 0 to 10.
+        Join the centres of particles with gaps up to this, in mean radii, from 0 to 10; by ``"force"`` of those in
+        contact, in lines as thick as their normal force, dashed where they slip.
     animation
         The particles of all frames instead, as ``particles.gif``.
     pixels
@@ -80,8 +81,6 @@ def plot(
     azimuth, elevation = (float(angle) for angle in view)
     if not (math.isfinite(azimuth) and abs(elevation) <= 90.0):
         raise ValueError(f"view = {view}: must be two angles in degrees, the second from -90 to 90")
-    if contacts is not None and not 0.0 <= contacts <= 10.0:
-        raise ValueError(f"contacts = {contacts}: must be a number from 0 to 10")
     if slice is not None and flow is None:
         raise ValueError(f"slice = {slice!r}: needs flow")
     options = {
@@ -92,7 +91,7 @@ def plot(
         "slice": slice,
         "view": (azimuth, elevation),
         "colour": colour,
-        "contacts": None if contacts is None else float(contacts),
+        "contacts": None if contacts is None else str(contacts),
         "animation": bool(animation),
         "pixels": int(pixels),
         "rate": float(rate),

@@ -8,7 +8,8 @@ use rayon::prelude::*;
 
 use super::error::PlotError;
 use super::look::Look;
-use super::snapshot::{Scene, SceneView, beside_pictures};
+use super::snapshot::{Scene, SceneView, beside_pictures, lines_of_contacts};
+use crate::contacts::FrameContact;
 use crate::frames::{dimension, frame_files, read_frames};
 
 /// Width of the drawings in SVG pixels: the size of their text, whatever their pixels.
@@ -48,7 +49,11 @@ fn animated<const D: usize>(
 ) -> Result<Vec<u8>, PlotError> {
     look.check(frames, first)?;
     let is_sheared = frames.iter().any(|frame| frame.strain != 0.0);
-    let scene = |frame: &XyzFrame<D>| Scene::of(frame, look, is_sheared);
+    let contacts = lines_of_contacts(frames, look, first)?;
+    let frames: Vec<_> = frames.iter().zip(&contacts).collect();
+    let scene = |(frame, contacts): &(&XyzFrame<D>, &Vec<FrameContact<D>>)| {
+        Scene::of(frame, contacts, look, is_sheared)
+    };
     let views = frames.par_iter().map(|frame| scene(frame).view());
     let Some(view) = views.reduce_with(SceneView::around) else { return Ok(Vec::new()) };
     let still = |canvas: &Canvas| {
@@ -58,7 +63,7 @@ fn animated<const D: usize>(
     let failed = |source| PlotError::Animation { path: path.to_owned(), source };
     let mut animation: Option<Animation> = None;
     for batch in frames.chunks(BATCH) {
-        let draw = |frame: &XyzFrame<D>| still(&scene(frame).draw(&view, WIDTH));
+        let draw = |frame: &_| still(&scene(frame).draw(&view, WIDTH));
         let stills = batch.par_iter().map(draw).collect::<Result<Vec<Still>, _>>()?;
         for still in stills {
             match &mut animation {

@@ -72,6 +72,16 @@ pub enum PlotError {
         /// The frame.
         path: PathBuf,
     },
+    /// No forces between the particles of frames.
+    #[error(
+        "{}: no <name>-gaps.csv with forces of contacts beside its folder, so there are no lines of them: runs of ten \
+         particles and more with a contact model write it",
+        path.display()
+    )]
+    NoForcesOfPairs {
+        /// The frame.
+        path: PathBuf,
+    },
     /// No fields of the flow.
     #[error(
         "{}: no fields of the flow: run with --vtk N, or with an [[output]] of kind \"vtk\" in the case, \

@@ -142,7 +142,8 @@ fn paths(
     Ok(Chart { marks, notes, ..chart(x, y, curves) })
 }
 
-/// Viscosities, and below them normal stresses, against strain.
+/// Viscosities, and below them normal stresses, against strain; where contacts act in the flow also what
+/// share of the viscosity is whose, and how many contacts a particle has.
 pub fn rheology(results: &Results, width_mm: f64, is_needed: bool) -> Result<Option<Canvas>, PlotError> {
     let Some(source) = results.rheology(is_needed)? else { return Ok(None) };
     let viscosity = [
@@ -151,11 +152,37 @@ pub fn rheology(results: &Results, width_mm: f64, is_needed: bool) -> Result<Opt
         ("viscosity_of_films", "share of films"),
     ];
     let normal = [("N1", "*N*_{1}"), ("N2", "*N*_{2}"), ("particle_pressure", "particle pressure")];
-    let charts = [
+    let mut charts = vec![
         against_strain(&source, "relative viscosity", &viscosity, 0)?,
         against_strain(&source, "stress / viscous stress", &normal, viscosity.len())?,
     ];
+    if source.table.find("viscosity_of_friction").is_some() {
+        let contacts = [("sticking_contacts", "that stick"), ("sliding_contacts", "that slip")];
+        charts.insert(1, shares_of_viscosity(&source)?);
+        charts.push(against_strain(&source, "contacts of a particle", &contacts, 0)?);
+    }
     Ok(Some(stacked(&charts, width_mm)))
+}
+
+/// What flow, normal and tangential forces of contacts, and repulsion add to the relative viscosity.
+fn shares_of_viscosity(source: &TableSource) -> Result<Chart, PlotError> {
+    let names = ["viscosity", "viscosity_of_contacts", "viscosity_of_friction", "viscosity_of_repulsion"];
+    let [all, contacts, friction, repulsion] = names.map(|name| source.column(name));
+    let (all, contacts, friction, repulsion) = (all?, contacts?, friction?, repulsion?);
+    let less =
+        |one: &[f64], other: &[f64]| -> Vec<f64> { one.iter().zip(other).map(|(a, b)| a - b).collect() };
+    let shares = [
+        ("flow", less(&less(all, contacts), repulsion)),
+        ("contacts, normal", less(contacts, friction)),
+        ("friction", friction.to_vec()),
+        ("repulsion", repulsion.to_vec()),
+    ];
+    let strain = source.column("strain")?;
+    let there = shares.iter().filter(|(name, share)| *name != "repulsion" || share.iter().any(|x| *x != 0.0));
+    let curves = there
+        .zip(PALETTE)
+        .map(|((name, share), stroke)| curve(Some((*name).to_owned()), stroke, strain, share));
+    Ok(over_strain(strain, "shares of the viscosity", curves.collect()))
 }
 
 /// Columns against strain, with strokes from `first` on; `N2` is there in 3D only.
@@ -173,8 +200,12 @@ fn against_strain(
             curves.push(curve(Some((*label).to_owned()), *stroke, strain, source.column(name)?));
         }
     }
+    Ok(over_strain(strain, label, curves))
+}
+
+fn over_strain(strain: &[f64], label: &str, curves: Vec<Curve>) -> Chart {
     let y = Axis::around(label, points(&curves).map(|point| point.1).collect::<Vec<_>>());
-    Ok(chart(Axis::around("strain *γ*", strain.iter().copied()), y, curves))
+    chart(Axis::around("strain *γ*", strain.iter().copied()), y, curves)
 }
 
 /// Iterations, where there are linear systems to solve, and below them seconds of each phase against time.

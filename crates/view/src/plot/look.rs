@@ -78,6 +78,27 @@ named! {
     }
 }
 
+/// What lines between centres tell.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Lines {
+    /// Gaps up to this, in mean radii.
+    Near(f64),
+    /// Contacts: as thick as their normal force, dashed where surfaces slip.
+    Forces,
+}
+
+impl FromStr for Lines {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        match (text, text.parse()) {
+            ("force", _) => Ok(Self::Forces),
+            (_, Ok(reach)) if (0.0..=10.0).contains(&reach) => Ok(Self::Near(reach)),
+            _ => Err("must be a number from 0 to 10 (mean radii), or force".to_owned()),
+        }
+    }
+}
+
 /// The look of particles.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Look {
@@ -85,8 +106,8 @@ pub struct Look {
     pub viewpoint: Viewpoint,
     /// What colours tell.
     pub coloring: Coloring,
-    /// Lines join the centres of particles with gaps up to this, in mean radii.
-    pub network: Option<f64>,
+    /// Lines that join the centres of particles.
+    pub network: Option<Lines>,
 }
 
 impl Look {
@@ -127,12 +148,14 @@ impl Look {
     }
 
     /// Name of what colours tell, and what stands at the ends of their bar.
-    pub(super) fn legend(&self, most: f64) -> [String; 3] {
+    pub(super) fn legend(&self, most: f64, is_flat: bool) -> [String; 3] {
         match self.coloring {
             Coloring::Speed => ["speed (length / time)".to_owned(), "0".to_owned(), told(most)],
             Coloring::Spin => ["spin (1 / time)".to_owned(), "0".to_owned(), told(most)],
+            // In 2D its unit is another one where contacts act in the flow.
             Coloring::ContactForce => {
-                ["contact force / 6π*η* (length^{2} / time)".to_owned(), "0".to_owned(), told(most)]
+                let unit = if is_flat { "" } else { " (length^{2} / time)" };
+                [format!("contact force / 6π*η*{unit}"), "0".to_owned(), told(most)]
             }
             Coloring::Gap => {
                 ["smallest gap / *a*".to_owned(), "≤ 10^{\u{2212}4}".to_owned(), "≥ 1".to_owned()]

@@ -13,6 +13,7 @@ use gluey_pictures::Curve;
 use super::error::PlotError;
 use super::figure::Figure;
 use super::snapshot::{EDGE, PERIODIC};
+use crate::contacts::with_numbers;
 
 /// How trajectories begin.
 const HEADER: &[u8] = b"t,x1,";
@@ -203,30 +204,8 @@ fn is_trajectory(path: &Path) -> Result<bool, PlotError> {
 
 fn read(path: PathBuf) -> Result<TableSource, PlotError> {
     let text = whole_lines(&path)?;
-    match NumberTable::parse(&numbers(&text)) {
+    match NumberTable::parse(&with_numbers(&text)) {
         Ok(table) => Ok(TableSource { path, table }),
         Err(source) => Err(PlotError::Table { path, source }),
-    }
-}
-
-/// The text with numbers for words in its last column: 1 for walls, 0 for other partners of a gap.
-fn numbers(text: &str) -> String {
-    let lines = text.lines().map(|line| match line.rsplit_once(',') {
-        Some((numbers, "particle" | "image")) => format!("{numbers},0"),
-        Some((numbers, "wall")) => format!("{numbers},1"),
-        _ => line.to_owned(),
-    });
-    lines.collect::<Vec<_>>().join("\n")
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn partners_have_numbers() {
-        let table = NumberTable::parse(&numbers("t,i,partner\n0,1,wall\n0,2,image\n")).expect("numbers");
-        assert_eq!(table.column("partner"), Ok(&[1.0, 0.0][..]));
-        assert!(NumberTable::parse(&numbers("t,i,partner\n0,1,ghost\n")).is_err(), "an unknown partner");
     }
 }

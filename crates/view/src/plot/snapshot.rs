@@ -10,8 +10,9 @@ use gluey_pictures::{Ball, Canvas, PIXELS_PER_MM, Rgb, Stroke, color_scale};
 use gluey_suspension::Container;
 
 use super::error::PlotError;
-use super::look::{Look, Viewpoint, near_pairs};
-use super::told::told_to;
+use super::look::{Lines, Look, Viewpoint, near_pairs};
+use super::told::{told, told_to};
+use crate::contacts::{FrameContact, contacts_of};
 use crate::frames::{dimension, frame_files, read_frames};
 
 pub(super) const EDGE: Stroke = Stroke { color: "#777777", width: 1.2, dashes: None };
@@ -20,6 +21,14 @@ pub(super) const PERIODIC: Stroke = Stroke { color: "#777777", width: 1.2, dashe
 const IMAGE: f64 = 0.3;
 /// Lines between near particles.
 const LINK: Stroke = Stroke { color: "#c8471b", width: 2.0, dashes: None };
+/// Contacts that slip, and the widest line of a contact.
+const SLIPPING: Stroke = Stroke { color: "#0b4f9e", width: 2.0, dashes: Some("5 2.5") };
+const WIDEST: f64 = 8.0;
+const THINNEST: f64 = 0.8;
+/// Length of a sample in the legend.
+const SAMPLE: f64 = 28.0;
+/// Light around lines of contacts.
+const HALO: f64 = 2.0;
 /// Parts of an edge in front that are seen or not.
 const EDGE_PARTS: usize = 400;
 /// Share of white in the colours of the particles that are farthest away, in 3D.
@@ -88,7 +97,20 @@ fn drawn<const D: usize>(
 ) -> Result<Canvas, PlotError> {
     look.check(frames, file)?;
     let is_sheared = frames[0].strain != 0.0 || frames[0].time == 0.0;
-    Ok(Scene::of(&frames[0], look, is_sheared).draw_alone(width))
+    let contacts = lines_of_contacts(frames, look, file)?;
+    Ok(Scene::of(&frames[0], &contacts[0], look, is_sheared).draw_alone(width))
+}
+
+/// The contacts of each frame where lines tell of them, which they cannot without a table of their forces.
+pub(super) fn lines_of_contacts<const D: usize>(
+    frames: &[XyzFrame<D>],
+    look: &Look,
+    file: &Path,
+) -> Result<Vec<Vec<FrameContact<D>>>, PlotError> {
+    if look.network != Some(Lines::Forces) {
+        return Ok(vec![Vec::new(); frames.len()]);
+    }
+    contacts_of(file, frames)?.ok_or_else(|| PlotError::NoForcesOfPairs { path: file.to_owned() })
 }
 
 /// The number in `particles-<step>.xyz`.
@@ -119,7 +141,15 @@ struct Seen {
     is_image: bool,
 }
 
-/// The sides of the rectangle that has room in a drawing, and the largest number behind a colour.
+/// A line between the centres of two particles.
+struct Link {
+    ends: [[f64; 3]; 2],
+    /// The size of their normal force and whether they slip, where lines tell of contacts.
+    contact: Option<(f64, Option<bool>)>,
+}
+
+/// The sides of the rectangle that has room in a drawing, and the largest number behind a colour and the
+/// width of a line.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct SceneView {
     left: f64,
@@ -127,6 +157,7 @@ pub(super) struct SceneView {
     low: f64,
     high: f64,
     most: f64,
+    most_force: f64,
 }
 
 impl SceneView {
@@ -138,6 +169,7 @@ impl SceneView {
             low: self.low.min(other.low),
             high: self.high.max(other.high),
             most: self.most.max(other.most),
+            most_force: self.most_force.max(other.most_force),
         }
     }
 }
@@ -147,8 +179,7 @@ pub(super) struct Scene {
     is_flat: bool,
     look: Look,
     balls: Vec<Seen>,
-    /// Lines between near particles.
-    links: Vec<[[f64; 3]; 2]>,
+    links: Vec<Link>,
     /// Edges of the box, and whether they are periodic borders of the plane.
     edges: Vec<([[f64; 3]; 2], bool)>,
     caption: String,
@@ -156,7 +187,12 @@ pub(super) struct Scene {
 
 impl Scene {
     /// What is seen of this frame; the strain is told of runs that are sheared.
-    pub fn of<const D: usize>(frame: &XyzFrame<D>, look: &Look, is_sheared: bool) -> Self {
+    pub fn of<const D: usize>(
+        frame: &XyzFrame<D>,
+        contacts: &[FrameContact<D>],
+        look: &Look,
+        is_sheared: bool,
+    ) -> Self {
         // The same box, as upright as its images allow.
         let container = frame.container.tilted(frame.container.lattice().reduced().tilt());
         let measures = look.measures(frame);
@@ -171,7 +207,7 @@ impl Scene {
             balls.extend(images.map(seen));
         }
         balls.sort_by(|one, other| one.at[2].total_cmp(&other.at[2]));
-        let links = look.network.map_or(Vec::new(), |reach| links(frame, &container, view, reach));
+        let links = links(frame, contacts, look, &container);
         let strain = match is_sheared {
             true => format!(", strain *γ* = {}", told_to(frame.strain, 4)),
             false => String::new(),
@@ -189,7 +225,15 @@ impl Scene {
         };
         let measures = self.balls.iter().map(|ball| ball.measure);
         let most = self.look.end().unwrap_or_else(|| measures.fold(0.0, f64::max));
-        SceneView { left: room(0, -1.0), right: room(0, 1.0), low: room(1, -1.0), high: room(1, 1.0), most }
+        let most_force = self.forces().fold(0.0, f64::max);
+        let [left, right, low, high] =
+            [(0, -1.0), (0, 1.0), (1, -1.0), (1, 1.0)].map(|(axis, sign)| room(axis, sign));
+        SceneView { left, right, low, high, most, most_force }
+    }
+
+    /// The sizes of the normal forces of contacts that lines tell of.
+    fn forces(&self) -> impl Iterator<Item = f64> {
+        self.links.iter().filter_map(|link| Some(link.contact?.0))
     }
 
     fn draw_alone(&self, width: f64) -> Canvas {
@@ -198,12 +242,13 @@ impl Scene {
 
     /// A drawing that has room for this view.
     pub fn draw(&self, view: &SceneView, width: f64) -> Canvas {
-        let SceneView { left, right, low, high, most } = *view;
+        let SceneView { left, right, low, high, most, most_force } = *view;
         // Not higher than wide.
         let scale = (width - 2.0 * MARGIN) / (right - left).max(high - low);
         let shift = MARGIN.max(0.5 * (width - scale * (right - left)));
         let on_paper = |at: [f64; 3]| (shift + scale * (at[0] - left), MARGIN + scale * (high - at[1]));
-        let legend = if width < NARROW { LEGEND + ROW } else { LEGEND };
+        let shows_forces = self.look.network == Some(Lines::Forces);
+        let legend = LEGEND + if width < NARROW { ROW } else { 0.0 } + if shows_forces { ROW } else { 0.0 };
         let height = scale * (high - low) + MARGIN + legend;
         let mut canvas = Canvas::new(width, height);
         self.draw_edges(&mut canvas, on_paper, false);
@@ -218,11 +263,27 @@ impl Scene {
             });
         }
         self.draw_edges(&mut canvas, on_paper, true);
-        for [from, to] in &self.links {
-            canvas.line(on_paper(*from), on_paper(*to), LINK);
-        }
+        self.draw_links(&mut canvas, on_paper, most_force);
         self.draw_legend(&mut canvas, most, width, height - legend);
+        if shows_forces {
+            self.draw_legend_of_forces(&mut canvas, most_force, height - 12.0);
+        }
         canvas
+    }
+
+    fn draw_links(&self, canvas: &mut Canvas, on_paper: impl Fn([f64; 3]) -> (f64, f64), most_force: f64) {
+        for Link { ends: [from, to], contact } in &self.links {
+            let stroke = contact.map_or(LINK, |(force, slides)| of_contact(force / most_force, slides));
+            let ends = (on_paper(*from), on_paper(*to));
+            if contact.is_some() {
+                canvas.line(
+                    ends.0,
+                    ends.1,
+                    Stroke { color: "#ffffff", width: stroke.width + HALO, dashes: None },
+                );
+            }
+            canvas.line(ends.0, ends.1, stroke);
+        }
     }
 
     /// Share of white at a depth: none in front, most at the back.
@@ -273,7 +334,7 @@ impl Scene {
     }
 
     fn draw_legend(&self, canvas: &mut Canvas, most: f64, width: f64, top: f64) {
-        let [name, low, high] = self.look.legend(most);
+        let [name, low, high] = self.look.legend(most, self.is_flat);
         let (left, y, length) = (MARGIN, top + 40.0, 0.4 * width);
         canvas.text(left, y - 7.0, 15.0, "start", &name);
         canvas.color_bar((left, y), (length, 10.0));
@@ -282,6 +343,30 @@ impl Scene {
         let below = if width < NARROW { 25.0 + ROW } else { 9.0 };
         canvas.text(width - MARGIN, y + below, 15.0, "end", &self.caption);
     }
+
+    /// What the widths of lines tell and, where contacts have friction, how those that slip are drawn.
+    fn draw_legend_of_forces(&self, canvas: &mut Canvas, most_force: f64, y: f64) {
+        let knows_slip =
+            self.links.iter().any(|link| link.contact.is_some_and(|(_, slides)| slides.is_some()));
+        let names = match knows_slip {
+            true => vec![("sticks", Some(false)), ("slips", Some(true))],
+            false => vec![("contact", None)],
+        };
+        let mut left = MARGIN;
+        for (name, slides) in names {
+            canvas.line((left, y - 4.0), (left + SAMPLE, y - 4.0), of_contact(0.4, slides));
+            canvas.text(left + SAMPLE + 6.0, y, 13.0, "start", name);
+            left += SAMPLE + 58.0;
+        }
+        let force = format!("widest: normal force / 6π*η* = {}", told(most_force));
+        canvas.text(left, y, 13.0, "start", &force);
+    }
+}
+
+/// The stroke of a contact with this share of the largest force.
+fn of_contact(share: f64, slides: Option<bool>) -> Stroke {
+    let stroke = if slides == Some(true) { SLIPPING } else { LINK };
+    Stroke { width: THINNEST + (WIDEST - THINNEST) * share, ..stroke }
 }
 
 /// A colour with a share of white.
@@ -289,24 +374,39 @@ fn faded(color: Rgb, share: f64) -> Rgb {
     color.map(|part| (f64::from(part) + share * (255.0 - f64::from(part))).round() as u8)
 }
 
-/// Lines between the centres of near particles; across a border, from either one half of the way.
+/// Lines between the centres of near particles or of contacts; across a border, from either one half of the
+/// way.
 fn links<const D: usize>(
     frame: &XyzFrame<D>,
+    contacts: &[FrameContact<D>],
+    look: &Look,
     container: &Container<D>,
-    view: Viewpoint,
-    reach: f64,
-) -> Vec<[[f64; 3]; 2]> {
-    let mut links = Vec::new();
-    for ([first, second], arm, _) in near_pairs(frame, reach) {
-        let [from, to] = [first, second].map(|i| container.wrapped(&frame.positions[i]));
-        if (from + arm - to).norm() < 1e-9 * arm.norm() {
-            links.push([view.turned(&from), view.turned(&to)]);
-        } else {
-            links.push([view.turned(&from), view.turned(&(from + 0.5 * arm))]);
-            links.push([view.turned(&to), view.turned(&(to - 0.5 * arm))]);
+) -> Vec<Link> {
+    let place = |i: usize| container.wrapped(&frame.positions[i]);
+    let between = |first: usize, second: Option<usize>, arm: &Vector<D>, contact| {
+        let from = place(first);
+        let lines = match second.map(place) {
+            Some(to) if (from + arm - to).norm() >= 1e-9 * arm.norm() => {
+                vec![[from, from + 0.5 * arm], [to, to - 0.5 * arm]]
+            }
+            _ => vec![[from, from + arm]],
+        };
+        let turned = move |ends: [Vector<D>; 2]| ends.map(|end| look.viewpoint.turned(&end));
+        lines.into_iter().map(move |ends| Link { ends: turned(ends), contact })
+    };
+    match look.network {
+        None => Vec::new(),
+        Some(Lines::Near(reach)) => {
+            let pairs = near_pairs(frame, reach).into_iter();
+            pairs.flat_map(|([first, second], arm, _)| between(first, Some(second), &arm, None)).collect()
+        }
+        Some(Lines::Forces) => {
+            let line = |one: &FrameContact<D>| {
+                between(one.first, one.second, &one.arm, Some((one.force.abs(), one.slides)))
+            };
+            contacts.iter().flat_map(line).collect()
         }
     }
-    links
 }
 
 fn edges<const D: usize>(container: &Container<D>, view: Viewpoint) -> Vec<([[f64; 3]; 2], bool)> {

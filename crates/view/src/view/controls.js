@@ -26,10 +26,10 @@ function toggle(id) {
   draw();
 }
 
-function nextColour() {
-  const { options, selectedIndex } = element("colour");
+function next(id) {
+  const { options, selectedIndex } = element(id);
   const others = [...options.keys()].map((n) => (selectedIndex + 1 + n) % options.length);
-  element("colour").selectedIndex = others.find((n) => !options[n].disabled);
+  element(id).selectedIndex = others.find((n) => !options[n].disabled);
   draw();
 }
 
@@ -43,8 +43,8 @@ const keys = {
   "=": () => zoom(1.2),
   "-": () => zoom(1 / 1.2),
   0: reset,
-  c: nextColour,
-  l: () => toggle("links"),
+  c: () => next("colour"),
+  l: () => next("lines"),
   w: () => toggle("wrap"),
   i: () => toggle("images"),
 };
@@ -78,22 +78,31 @@ element("back").addEventListener("click", () => show(frame - 1));
 element("forth").addEventListener("click", () => show(frame + 1));
 element("reset").addEventListener("click", reset);
 element("frame").addEventListener("input", () => show(Number(element("frame").value)));
-["colour", "links", "reach", "wrap", "images"].forEach((id) => element(id).addEventListener("input", draw));
+["colour", "lines", "reach", "wrap", "images"].forEach((id) => element(id).addEventListener("input", draw));
 window.addEventListener("resize", draw);
 window.matchMedia("(prefers-color-scheme: dark)").addEventListener("change", draw);
 
-// `view.html#frame=20&colour=spin&images` begins with that frame, colour and box.
+// Chooses what is wanted, unless the run does not have it.
+function choose(id, value) {
+  const chosen = [...element(id).options].find((option) => option.value === value);
+  if (chosen && !chosen.disabled) element(id).value = value;
+}
+
+function withhold(id, value, why) {
+  const option = [...element(id).options].find((one) => one.value === value);
+  option.disabled = true;
+  option.textContent += ` (${why})`;
+}
+
+// `view.html#frame=20&colour=spin&lines=forces&images` begins with that frame, colour, lines and box.
 function begin() {
   if (flat) element("help").textContent = "drag: move \u00b7 wheel or + \u2212: zoom";
   element("frame").max = run.frames.length - 1;
   const wanted = new URLSearchParams(location.hash.slice(1));
   element("images").checked = flat || wanted.has("images");
-  const options = [...element("colour").options];
-  const forces = options.find((option) => option.value === "contact-force");
-  forces.disabled = !hasForces;
-  if (!hasForces) forces.textContent = "contact force (none in the frames)";
-  const chosen = options.find((option) => option.value === wanted.get("colour"));
-  if (chosen && !chosen.disabled) element("colour").value = chosen.value;
+  if (!hasForces) withhold("colour", "contact-force", "none in the frames");
+  if (!hasContacts) withhold("lines", "forces", "no table of them");
+  ["colour", "lines"].forEach((id) => choose(id, wanted.get(id)));
   show(Math.trunc(Number(wanted.get("frame"))) || 0);
 }
 

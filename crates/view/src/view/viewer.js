@@ -131,6 +131,20 @@ function turns() {
 // Frames of a run without a contact model have no forces.
 const hasForces = run.frames.every((now) => now.forces.length === 3 * count);
 
+// Neither have those without a table of near pairs contacts.
+const CONTACT_NUMBERS = 7;
+const hasContacts = run.frames.every((now) => now.contacts);
+
+// The contacts of a frame: normal forces are over 6 pi eta; walls are no partner.
+function contacts(now) {
+  const found = [];
+  for (let n = 0; n < now.contacts.length; n += CONTACT_NUMBERS) {
+    const [i, j, x, y, z, force, slides] = now.contacts.slice(n, n + CONTACT_NUMBERS);
+    found.push({ i, j: j < 0 ? null : j, apart: [x, y, z], force: Math.abs(force), slides: slides > 0 });
+  }
+  return found;
+}
+
 // Numbers of the particles that decide their colours.
 const measures = {
   speed: (now) => run.radii.map((_, i) => norm(at(now.velocities, i))),
@@ -288,25 +302,62 @@ function drawBall(ball, eye, turn) {
   pen.globalAlpha = 1;
 }
 
-function drawLinks(eye, now) {
-  const reach = 10 ** Number(element("reach").value);
+// The largest normal force in all frames, so that a width means the same thing in each.
+function largestForce() {
+  run.largestForce ??= run.frames.flatMap(contacts).reduce((most, { force }) => Math.max(most, force), 0);
+  return run.largestForce;
+}
+
+// A line of a contact with this share of the largest force; those that slip are dashed.
+const ofContact = (share, slides) =>
+  ({ width: 1 + 8 * share, colour: slides ? "--slip" : "--link", dashes: slides ? [6, 3] : [] });
+
+// Lines from centre to centre.
+const lines = {
+  none: () => [],
+  pairs: (now) => pairs(now).filter(({ gap }) => gap <= 10 ** Number(element("reach").value)).map((pair) =>
+    ({ ...pair, width: 1 + 0.8 * Math.log10(1 / Math.max(pair.gap, SMALLEST_GAP)), colour: "--link", dashes: [] })),
+  forces: (now) => contacts(now).map((contact) => ({ ...contact, ...ofContact(contact.force / largestForce(), contact.slides) })),
+};
+
+function drawLines(eye, now) {
   const inBox = element("wrap").checked;
-  let drawn = 0;
-  pairs(now).filter(({ gap }) => gap <= reach).forEach(({ i, j, apart, gap }) => {
-    drawn++;
-    const width = 1 + 0.8 * Math.log10(1 / Math.max(gap, SMALLEST_GAP));
-    const ends = [[i, apart], [j, apart.map((x) => -x)]].map(([n, step]) => {
+  const drawn = lines[element("lines").value](now);
+  drawn.forEach(({ i, j, apart, width, colour, dashes }) => {
+    const partner = j === null ? [] : [[j, apart.map((x) => -x)]];
+    const ends = [[i, apart], ...partner].map(([n, step]) => {
       const start = inBox ? wrapped(at(now.positions, n), now) : at(now.positions, n);
       return [eye.project(start, now), eye.project(plus(start, step), now)];
     });
     // Across a border the pair is seen at both ends; elsewhere both lines are the same.
-    const across = Math.hypot(ends[0][1].x - ends[1][0].x, ends[0][1].y - ends[1][0].y) > 0.5;
+    const across = j !== null && Math.hypot(ends[0][1].x - ends[1][0].x, ends[0][1].y - ends[1][0].y) > 0.5;
     (across ? ends : ends.slice(0, 1)).forEach(([from, to]) => {
       line(from, to, themed("--paper"), width + 2.5);
-      line(from, to, themed("--link"), width);
+      line(from, to, themed(colour), width, dashes);
     });
   });
-  return drawn;
+  return drawn.length;
+}
+
+// What the widths of lines tell.
+function drawLegendOfForces(eye) {
+  if (element("lines").value !== "forces") return;
+  const [left, top, width] = [eye.width - 216, eye.height - 40, 200];
+  pen.globalAlpha = 0.8;
+  pen.fillStyle = themed("--paper");
+  pen.fillRect(left - 8, top - 24, width + 24, 60);
+  pen.globalAlpha = 1;
+  pen.font = "13px system-ui, sans-serif";
+  pen.textAlign = "left";
+  [["sticks", false], ["slips", true]].forEach(([name, slides], n) => {
+    const start = left + 100 * n;
+    const stroke = ofContact(0.4, slides);
+    line({ x: start, y: top + 6 }, { x: start + 36, y: top + 6 }, themed(stroke.colour), stroke.width, stroke.dashes);
+    pen.fillStyle = themed("--ink");
+    pen.fillText(name, start + 44, top + 10);
+  });
+  pen.fillText(`widest: force / 6\u03c0\u03b7 = ${largestForce().toPrecision(3)}`, left, top + 30);
+  pen.fillText("contacts", left, top - 8);
 }
 
 function drawLegend(eye) {
@@ -337,15 +388,17 @@ function describe(now, drawn) {
   const smallest = pairs(now).reduce((least, { gap }) => Math.min(least, gap), Infinity);
   const gap = smallest > 1 ? "above 1" : smallest < SMALLEST_GAP ? `below ${SMALLEST_GAP}` : smallest.toPrecision(2);
   const strain = run.frames.some((one) => one.strain !== 0) ? `strain ${now.strain.toPrecision(4)}, ` : "";
-  const linked = element("links").checked ? `, pairs drawn: ${drawn}` : "";
+  const linked = element("lines").value === "none" ? "" : `, pairs drawn: ${drawn}`;
   element("facts").textContent = `frame ${frame + 1} of ${run.frames.length}, t = ${now.time.toPrecision(4)}, `
     + `${strain}${count} particles, smallest gap ${gap} radii${linked}`;
   element("reach-text").textContent = (10 ** Number(element("reach").value)).toPrecision(2);
+  element("reach").disabled = element("lines").value !== "pairs";
   element("frame").value = frame;
   canvas.setAttribute("aria-label", element("facts").textContent);
   document.body.dataset.frame = frame;
   document.body.dataset.pairs = drawn;
   document.body.dataset.colour = element("colour").value;
+  document.body.dataset.lines = element("lines").value;
 }
 
 function draw() {
@@ -356,8 +409,9 @@ function draw() {
   const list = balls(eye, now);
   list.forEach((ball) => drawBall(ball, eye, flat ? turns()[frame][ball.i] : 0));
   drawBox(eye, now, true);
-  const drawn = element("links").checked ? drawLinks(eye, now) : 0;
+  const drawn = drawLines(eye, now);
   drawLegend(eye);
+  drawLegendOfForces(eye);
   describe(now, drawn);
   document.body.dataset.balls = list.length;
 }

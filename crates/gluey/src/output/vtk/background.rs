@@ -143,7 +143,8 @@ mod tests {
 
     fn frame(step: usize) -> VtkFrame<2> {
         let (particles, twists, contacts, domain) = (vec![], vec![], vec![], Domain::default());
-        VtkFrame { step, time: step as f64, particles, twists, contacts, domain, in_box: None, fields: None }
+        let (time, in_flow, in_box, fields) = (step as f64, None, None, None);
+        VtkFrame { step, time, particles, twists, contacts, in_flow, domain, in_box, fields }
     }
 
     #[test]
