@@ -8,6 +8,7 @@ mod pictures;
 #[path = "../support/program.rs"]
 mod program;
 mod result_folder;
+mod rubbing;
 mod sweep;
 mod tables;
 mod viewer;

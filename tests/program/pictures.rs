@@ -232,8 +232,9 @@ fn run_with_flow<const D: usize>(radius: f64, flow: impl Fn(f64) -> (f64, f64)) 
     let mut writer = VtkWriter::create(&out.join("known-none-vtk"), &[]).expect("a folder");
     let particles = vec![Particle::new(Vector::<D>::repeat(0.5), radius)];
     let (twists, contacts, domain) = (vec![Twist::default()], vec![], Domain::default());
-    let (in_box, fields) = (None, Some(known::<D>(flow)));
-    let frame = VtkFrame { step: 20, time: 0.5, particles, twists, contacts, domain, in_box, fields };
+    let (in_flow, in_box, fields) = (None, None, Some(known::<D>(flow)));
+    let frame =
+        VtkFrame { step: 20, time: 0.5, particles, twists, contacts, in_flow, domain, in_box, fields };
     writer.write(&frame).expect("files");
     let center = vec!["0.5"; D].join(", ");
     let case = format!(

@@ -296,8 +296,9 @@ fn all_tables(folder: &Path) {
         let stress = format!("shear_stress = 1.0\n{none}domain = {{ boundary = \"sheared\" }}\n");
         let one = format!("particles = [{{ position = [{middle}], radius = 0.1 }}]\n");
         write(folder, "stress.toml", &format!("name = \"stress{dimension}\"\n{head}{stress}{one}{mesh}"));
-        let rough = "domain = { boundary = \"sheared\" }\ncontact = { strategy = \"rough\" }\n";
-        write(folder, "rough.toml", &format!("name = \"rough{dimension}\"\n{head}{rough}{one}{mesh}"));
+        let rough = "domain = { boundary = \"sheared\" }\ncontact = { strategy = \"rough\" }\n[suspension]\n\
+                     volume_fraction = 0.1\ncount = 10\nmin_gap = 0.05\n";
+        write(folder, "rough.toml", &format!("name = \"rough{dimension}\"\n{head}{rough}{mesh}"));
         for case in ["held", "many", "stress", "rough"] {
             let out = format!("{case}{dimension}");
             told(folder, &["run", &format!("{case}.toml"), "--out", &out, "--xyz", "1"]);

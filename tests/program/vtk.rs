@@ -7,7 +7,7 @@ use gluey::output::vtk::{
     Precision, ShownBox, VtkEncoding, VtkFrame, VtkWriter, read_fields, read_particles, write_piece,
 };
 use gluey::{Case, RunOptions, Silent, VtkOptions, run};
-use gluey_contact::{Contact, Domain, PairKey, Wall};
+use gluey_contact::{Contact, ContactForce, Domain, PairKey, Wall};
 use gluey_geom::{Particle, Twist, Vector};
 use gluey_motion::Fields;
 use gluey_suspension::Container;
@@ -263,6 +263,10 @@ fn particles_and_contacts() {
     assert_eq!(piece.cells.types, [CellType::Vertex, CellType::Vertex, CellType::Vertex, CellType::Line]);
     assert_eq!(numbers(&piece.data.cell, "gamma"), [0.0, 0.0, 0.0, -0.01]);
     assert_eq!(numbers(&piece.data.cell, "lambda"), [0.0, 0.0, 0.0, 0.3]);
+    assert!(
+        piece.data.cell.iter().all(|array| !format!("{array:?}").contains("friction")),
+        "contacts after the flow"
+    );
     let (nodes, offsets) = piece.cells.cell_verts.into_xml();
     assert_eq!((nodes.as_slice(), offsets.as_slice()), ([0, 1, 2, 0, 2].as_slice(), [1, 2, 3, 5].as_slice()));
     assert!(!folder.path().join("fields.pvd").exists(), "a collection without files");
@@ -281,6 +285,16 @@ fn contacts_with_walls_and_images() {
         gamma: -lambda,
         gap: 0.1 * lambda,
     });
+    let force = |one: &Contact| ContactForce {
+        pair: one.pair,
+        normal: Vector::y(),
+        force: Vector::<2>::new(-0.5, one.lambda),
+        branch: Vector::y(),
+        slip: Vector::<2>::new(0.25 * one.lambda, 0.0),
+        gap: one.gap,
+        floor: 0.01,
+        slides: one.lambda > 1.0,
+    };
     let mut writer = VtkWriter::create(folder.path(), &[]).expect("a folder");
     let frame = VtkFrame {
         step: 0,
@@ -288,7 +302,7 @@ fn contacts_with_walls_and_images() {
         particles: particles.to_vec(),
         twists: vec![Twist::default(); 2],
         contacts: contacts.to_vec(),
-        in_flow: None,
+        in_flow: Some(contacts.iter().map(force).collect()),
         domain,
         in_box: None,
         fields: None,
@@ -299,6 +313,13 @@ fn contacts_with_walls_and_images() {
     assert_eq!(piece.cells.types, [[CellType::Vertex; 2].as_slice(), &[CellType::Line; 3]].concat());
     assert_eq!(numbers(&piece.data.cell, "lambda"), [0.0, 0.0, 1.0, 2.0, 3.0]);
     assert_eq!(numbers(&piece.data.cell, "gamma"), [0.0, 0.0, -1.0, -2.0, -3.0]);
+    assert_eq!(
+        numbers(&piece.data.cell, "friction")[3..],
+        [0.0, 0.0, 0.0, -0.5, 0.0, 0.0, -0.5, 0.0, 0.0, -0.5, 0.0, 0.0]
+    );
+    assert_eq!(numbers(&piece.data.cell, "slip")[6..9], [0.25, 0.0, 0.0]);
+    assert_eq!(numbers(&piece.data.cell, "slides"), [0.0, 0.0, 0.0, 1.0, 1.0]);
+    assert_eq!(numbers(&piece.data.cell, "roughness"), [0.0, 0.0, 0.01, 0.01, 0.01]);
     let points: Vec<f64> = piece.points.cast_into().expect("numbers");
     // After the centres: the image of particle 1, and its foot point on the ceiling.
     assert_eq!(points[6..], [-0.5, 1.5, 0.0, 3.5, 2.0, 0.0]);

@@ -54,6 +54,16 @@ def test_gaps_and_rheology_of_a_suspension(tmp_path: Path) -> None:
     assert last.lattice[0].tolist() == [1.0, 0.0, 0.0] and last.lattice[1, 0] == pytest.approx(0.1)
 
 
+def test_pairs_in_contact_have_friction(tmp_path: Path) -> None:
+    rough = {"strategy": "rough", "roughness": 0.1, "friction": 0.5}
+    near = gluey.run({**SUSPENSION, "contact": rough}, tmp_path, progress=False).near_gaps
+    assert near is not None
+    touching = near[near["contact_force"] > 0.0]
+    assert len(touching) > 0 and np.isnan(near["slides"][near["contact_force"] == 0.0]).all()
+    assert (touching["friction_force"] <= 0.5 * touching["contact_force"] * (1.0 + 1e-9)).all()
+    assert set(touching["slides"]) <= {0.0, 1.0} and touching["roughness_over_a"] == pytest.approx(0.1)
+
+
 def test_frames_are_read_compressed_or_not(tmp_path: Path) -> None:
     run = gluey.run(spheres(end=0.1), tmp_path, progress=False)
     path = tmp_path / f"{run.name}-xyz" / "particles-000001.xyz"

@@ -34,6 +34,10 @@ def test_pictures_are_drawn(out: Path) -> None:
 def test_particles_and_flows_are_drawn_as_asked(out: Path, tmp_path: Path) -> None:
     (seen,) = gluey.plot(out, frame="last", view=(0, 90), colour="gap", contacts=1.0, formats=["svg"])
     assert "gap" in seen.read_text()
+    with pytest.raises(gluey.GlueyError, match="with forces of contacts"):
+        gluey.plot(out, frame="last", contacts="force")
+    with pytest.raises(ValueError, match='contacts: found "-1.0", must be a number from 0 to 10'):
+        gluey.plot(out, frame="last", contacts=-1.0)
     with pytest.raises(gluey.GlueyError, match="no fields of the flow"):
         gluey.plot(tmp_path, flow="speed")
     with pytest.raises(ValueError, match="flow: found \"force\", expected one of speed"):

@@ -104,7 +104,7 @@ struct PageFrame {
     /// Empty without a contact model.
     forces: Vec<f32>,
     /// Of each contact the particle, its partner (-1 for a wall), the way to it, the normal force, and
-    /// whether it slides; nothing where they are not known.
+    /// whether it slides (-1 where that is not known); nothing where they are not known.
     contacts: Option<Vec<f32>>,
 }
 
@@ -158,7 +158,7 @@ fn numbers<const D: usize>(contacts: &[FrameContact<D>]) -> Vec<f32> {
     let of_one = |contact: &FrameContact<D>| {
         let [x, y, z] = triple(contact.arm.as_slice());
         let partner = contact.second.map_or(-1.0, |second| second as f32);
-        let slides = f32::from(u8::from(contact.slides == Some(true)));
+        let slides = contact.slides.map_or(-1.0, |slides| f32::from(u8::from(slides)));
         [contact.first as f32, partner, x, y, z, contact.force as f32, slides]
     };
     contacts.iter().flat_map(of_one).collect()

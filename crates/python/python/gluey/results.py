@@ -35,19 +35,10 @@ __all__ = ["Frame", "Result", "ResultsError", "frame", "read", "table"]
 
 _RECORD = "-run.json"
 _SAID = re.compile(r'(\w+)=(?:"([^"]*)"|(\S+))')
-_NEAR = np.dtype(
-    [
-        ("t", "f8"),
-        ("i", "i8"),
-        ("j", "i8"),
-        ("gap_over_a", "f8"),
-        ("contact_force", "f8"),
-        ("repulsion_force", "f8"),
-        ("partner", "U8"),
-    ]
-)
-# Cells of forces that do not act are empty.
-_FORCES: Dict[Union[int, str], Callable[[str], float]] = {column: lambda text: float(text or "nan") for column in (4, 5)}
+_FORCES = ["contact_force", "repulsion_force"]
+# Where contacts act in the flow.
+_FRICTION = ["friction_force", "slip_speed", "slides", "roughness_over_a"]
+_NEAR = [["t", "i", "j", "gap_over_a", *forces, "partner"] for forces in (_FORCES, _FORCES + _FRICTION)]
 
 
 class ResultsError(ValueError):
@@ -82,10 +73,16 @@ def read(folder: PathLike, name: str | None = None) -> Result:
     return Result(folder, names[0] if name is None else name)
 
 
-def _near_of(lines: list[str]) -> NDArray[Any]:
+def _near_of(names: list[str], lines: list[str]) -> NDArray[Any]:
+    kinds = {"i": "i8", "j": "i8", "partner": "U8"}
+    dtype = np.dtype([(name, kinds.get(name, "f8")) for name in names])
     if not lines:
-        return np.empty(0, _NEAR)
-    return np.loadtxt(lines, dtype=_NEAR, delimiter=",", ndmin=1, converters=_FORCES)
+        return np.empty(0, dtype)
+    # Cells of forces that do not act are empty.
+    forces: Dict[Union[int, str], Callable[[str], float]] = {
+        column: lambda text: float(text or "nan") for column in range(4, len(names) - 1)
+    }
+    return np.loadtxt(lines, dtype=dtype, delimiter=",", ndmin=1, converters=forces)
 
 
 def table(path: PathLike) -> dict[str, Array]:
@@ -291,16 +288,17 @@ class Result:
 
         A structured array with the fields ``t``, ``i``, ``j``, ``gap_over_a``, ``contact_force`` and
         ``repulsion_force`` (nan without such a force), and ``partner``: ``particle``, the nearest periodic
-        ``image`` of one, or a ``wall``, of which ``j`` is 0 below and 1 above.
+        ``image`` of one, or a ``wall``, of which ``j`` is 0 below and 1 above. Where contacts act in the flow also
+        ``friction_force``, ``slip_speed``, ``slides`` (1 or 0) and ``roughness_over_a``, nan without a contact.
         """
         path = self._newest("-gaps.csv")
         if path is None:
             return None
         names, lines = _lines(path)
-        if names != list(_NEAR.names or ()):
+        if names not in _NEAR:
             raise ResultsError(f"{path}: not a table of gaps")
         try:
-            near = _near_of(lines)
+            near = _near_of(names, lines)
         except ValueError as error:
             raise ResultsError(f"{path}: not a table of gaps ({error})") from error
         near["i"] -= 1

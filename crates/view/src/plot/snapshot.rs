@@ -266,7 +266,7 @@ impl Scene {
         self.draw_links(&mut canvas, on_paper, most_force);
         self.draw_legend(&mut canvas, most, width, height - legend);
         if shows_forces {
-            self.draw_legend_of_forces(&mut canvas, most_force, height - 12.0);
+            self.draw_legend_of_forces(&mut canvas, most_force, width < NARROW);
         }
         canvas
     }
@@ -344,13 +344,15 @@ impl Scene {
         canvas.text(width - MARGIN, y + below, 15.0, "end", &self.caption);
     }
 
-    /// What the widths of lines tell and, where contacts have friction, how those that slip are drawn.
-    fn draw_legend_of_forces(&self, canvas: &mut Canvas, most_force: f64, y: f64) {
-        let knows_slip =
+    /// What the widths of lines tell, in the row of the caption where it has one, and how contacts that slip
+    /// are drawn where there is friction.
+    fn draw_legend_of_forces(&self, canvas: &mut Canvas, most_force: f64, is_narrow: bool) {
+        let y = canvas.height() - 12.0;
+        let has_friction =
             self.links.iter().any(|link| link.contact.is_some_and(|(_, slides)| slides.is_some()));
-        let names = match knows_slip {
+        let names = match has_friction {
             true => vec![("sticks", Some(false)), ("slips", Some(true))],
-            false => vec![("contact", None)],
+            false => vec![("touches", None)],
         };
         let mut left = MARGIN;
         for (name, slides) in names {
@@ -358,8 +360,9 @@ impl Scene {
             canvas.text(left + SAMPLE + 6.0, y, 13.0, "start", name);
             left += SAMPLE + 58.0;
         }
-        let force = format!("widest: normal force / 6π*η* = {}", told(most_force));
-        canvas.text(left, y, 13.0, "start", &force);
+        let force = format!("widest: force / 6π*η* = {}", told(most_force));
+        let (x, y) = if is_narrow { (MARGIN, y - 17.0) } else { (left, y) };
+        canvas.text(x, y, 13.0, "start", &force);
     }
 }
 

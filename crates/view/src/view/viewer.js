@@ -140,7 +140,7 @@ function contacts(now) {
   const found = [];
   for (let n = 0; n < now.contacts.length; n += CONTACT_NUMBERS) {
     const [i, j, x, y, z, force, slides] = now.contacts.slice(n, n + CONTACT_NUMBERS);
-    found.push({ i, j: j < 0 ? null : j, apart: [x, y, z], force: Math.abs(force), slides: slides > 0 });
+    found.push({ i, j: j < 0 ? null : j, apart: [x, y, z], force: Math.abs(force), slides: slides > 0, hasFriction: slides >= 0 });
   }
   return found;
 }
@@ -349,7 +349,8 @@ function drawLegendOfForces(eye) {
   pen.globalAlpha = 1;
   pen.font = "13px system-ui, sans-serif";
   pen.textAlign = "left";
-  [["sticks", false], ["slips", true]].forEach(([name, slides], n) => {
+  const knowsSlip = run.frames.flatMap(contacts).some(({ hasFriction }) => hasFriction);
+  (knowsSlip ? [["sticks", false], ["slips", true]] : [["touches", false]]).forEach(([name, slides], n) => {
     const start = left + 100 * n;
     const stroke = ofContact(0.4, slides);
     line({ x: start, y: top + 6 }, { x: start + 36, y: top + 6 }, themed(stroke.colour), stroke.width, stroke.dashes);
