@@ -340,8 +340,8 @@ fn a_sheared_box_is_shown_whole() {
     let contacts = [Contact { pair: PairKey::across(0, 1, [-5, 2, 0]), lambda: 1.0, gamma: 0.0, gap: 0.0 }];
     let mut writer = VtkWriter::create(folder.path(), &[]).expect("a folder");
     let (particles, twists, contacts) = (particles.to_vec(), twists.to_vec(), contacts.to_vec());
-    let frame =
-        VtkFrame { step: 0, time: 0.0, particles, twists, contacts, in_flow, domain, in_box, fields: None };
+    let (in_flow, fields) = (None, None);
+    let frame = VtkFrame { step: 0, time: 0.0, particles, twists, contacts, in_flow, domain, in_box, fields };
     writer.write(&frame).expect("files");
 
     let near = |found: &[f64], exact: &[f64]| {
