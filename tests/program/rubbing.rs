@@ -128,6 +128,11 @@ fn force_chains_are_drawn() {
     let frames = data["frames"].as_array().expect("frames");
     let contacts = frames[frames.len() - 1]["contacts"].as_array().expect("contacts");
     assert_eq!(contacts.len(), 7 * (count(0.0) + count(1.0)));
+    let page = folder.path().join("out/view.html");
+    if let Some(drawn) = crate::viewer::drawn(folder.path(), &page, "frame=6&lines=forces") {
+        let lines = format!("data-pairs=\"{}\"", count(0.0) + count(1.0));
+        assert!(drawn.contains("data-lines=\"forces\"") && drawn.contains(&lines), "{drawn}");
+    }
     fs::remove_file(folder.path().join(format!("out/{STEM}-gaps.csv"))).expect("a table");
     fails(folder.path(), &picture, &["no <name>-gaps.csv with forces of contacts"]);
     let near = fails_of_name(folder.path());

@@ -52,7 +52,7 @@ fn a_page_shows_the_frames_of_a_run_without_a_network() {
 
 /// What a browser makes of a page, opened with what stands behind `#`; nothing where there is no browser.
 /// Nothing may stand on its console.
-fn drawn(folder: &Path, page: &Path, fragment: &str) -> Option<String> {
+pub fn drawn(folder: &Path, page: &Path, fragment: &str) -> Option<String> {
     let found = ["chromium", "chromium-browser", "google-chrome"]
         .into_iter()
         .find(|name| process::Command::new(name).arg("--version").output().is_ok());
