@@ -30,9 +30,9 @@ fn table(folder: &Path, end: &str) -> NumberTable {
     NumberTable::parse(&text.replace(",particle", ",0").replace(",image", ",0")).expect("numbers")
 }
 
-/// Coulomb's law, pair by pair: what sticks does not slip and holds less than the coefficient times the normal
-/// force, what slides holds as much, and surfaces are as near as their roughness. What does not touch has no
-/// such numbers.
+/// Coulomb's law, pair by pair: what sticks does not slip and holds less than the coefficient times the
+/// normal force, what slides holds as much, and surfaces are as near as their roughness. What does not touch
+/// has no such numbers.
 #[test]
 fn pairs_have_friction_and_slip() {
     let folder = run();

@@ -5,11 +5,12 @@
 //!
 //! Up to nine particles every pair has a column, `gap12_over_a,gap13_over_a,...,gap23_over_a,...`. From ten
 //! on there is one column `min_gap_over_a`, the smallest gap of all pairs, and a second file
-//! `<stem>-gaps.csv` lists what is near: a row `t,i,j,gap_over_a,contact_force,repulsion_force,partner` for
-//! each gap of at most [`GAP_CUTOFF_OVER_A`]; forces are positive apart, those of contacts over `6 pi eta`,
-//! and empty where there is no such force in the run. Where contacts act in the flow there are
-//! `friction_force,slip_speed,slides,roughness_over_a` before the partner, empty without a contact. Particles count from 1. The partner `j` is a
-//! `particle`, the nearest periodic `image` of one, or a `wall` (1 below, 2 above).
+//! `<stem>-gaps.csv` lists what is near: a row `t,i,j,gap_over_a,contact_force,repulsion_force,partner`
+//! for each gap of at most [`GAP_CUTOFF_OVER_A`]; forces are positive apart, those of contacts over
+//! `6 pi eta`, and empty where there is no such force in the run. Where contacts act in the flow there are
+//! `friction_force,slip_speed,slides,roughness_over_a` before the partner, empty without a contact.
+//! Particles count from 1. The partner `j` is a `particle`, the nearest periodic `image` of one, or a
+//! `wall` (1 below, 2 above).
 
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};

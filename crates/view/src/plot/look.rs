@@ -78,7 +78,7 @@ named! {
     }
 }
 
-/// What lines between centres tell.
+/// The meaning of lines between centres.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Lines {
     /// Gaps up to this, in mean radii.
