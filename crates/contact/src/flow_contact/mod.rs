@@ -306,7 +306,8 @@ impl<const D: usize> FlowContact<D> {
                 let slides = held >= (1.0 - AT_EDGE) * most;
                 report.contact.sliding_count += usize::from(slides);
                 let slip = touch.across(&touch.velocity(&outcome.twists));
-                let (pair, normal, branch, floor) = (touch.pair, touch.normal, touch.branch(), touch.floor);
+                let (pair, normal, branch) = (touch.pair, touch.normal, touch.branch());
+                let floor = self.smallest_gap(pair, step.radii);
                 forces.push(ContactForce { pair, normal, force: *force, branch, slip, gap, floor, slides });
             }
         }
