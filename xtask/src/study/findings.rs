@@ -20,7 +20,7 @@ pub struct Study {
 #[derive(Default)]
 pub struct Findings {
     /// Names of the columns with commas between them.
-    pub columns: &'static str,
+    pub columns: String,
     /// The rows.
     pub rows: Vec<Vec<String>>,
     /// Pictures with names.

@@ -1,14 +1,13 @@
 //! Rheology of rough spheres with friction against their fraction.
 
-use gluey::Tally;
 use gluey_verify::literature::{
     boyer_viscosity, eilers_viscosity, maron_pierce_viscosity, zarraga_viscosity,
 };
 
-use super::drawing::{StudySeries, curve, draw};
+use super::drawing::curve;
 use super::findings::{Findings, Study};
 use super::point::{Done, StudyPoint};
-use super::steady::steady;
+use super::rough::{Across, DrawnMean, PARTICLE_PRESSURE, SHARE_OF_CONTACTS, over_viscosity, rough_findings};
 
 const FILE: &str = "friction.toml";
 /// Coefficients of friction, and how they are called.
@@ -35,69 +34,23 @@ fn points(quick: bool) -> Vec<StudyPoint> {
         for &(friction, model) in frictions {
             let point = StudyPoint::new(format!("{fraction}-friction-{friction}"), model, fraction, FILE)
                 .with("suspension.volume_fraction", fraction)
-                .with("contact.friction", format!("{friction:?}"));
+                .rough(friction);
             points.push(if quick { point.with("suspension.count", 8).with("time.end", 0.4) } else { point });
         }
     }
     points
 }
 
-/// What is taken of the rheology.
-const COLUMNS: [&str; 7] = [
-    "viscosity",
-    "viscosity_by_dissipation",
-    "viscosity_of_contacts",
-    "viscosity_of_friction",
-    "N1",
-    "N2",
-    "particle_pressure",
-];
+const ACROSS: Across = Across { name: "phi", label: "volume fraction *φ*", is_logarithmic: false };
 
-/// A picture: its name, its label, and what is drawn of the means of the columns, with half an error bar.
-struct Drawn {
-    name: &'static str,
-    label: &'static str,
-    is_logarithmic: bool,
-    of: fn(&[[f64; 2]]) -> [f64; 2],
-    known: fn() -> Vec<(String, Vec<(f64, f64)>)>,
-}
-
-const DRAWN: [Drawn; 5] = [
-    Drawn {
-        name: "viscosity",
-        label: "relative viscosity",
-        is_logarithmic: true,
-        of: |means| means[0],
-        known: closures,
-    },
-    Drawn {
-        name: "contacts",
-        label: "share of contacts in the viscosity",
-        is_logarithmic: false,
-        of: |means| means[2].map(|number| number / means[0][0]),
-        known: Vec::new,
-    },
-    Drawn {
-        name: "first-normal-stress",
-        label: "*N*_{1} / shear stress",
-        is_logarithmic: false,
-        of: |means| means[4].map(|number| number / means[0][0]),
-        known: || vec![curve("Dai et al. (2013)", |phi| -0.8 * phi.powi(3), 45)],
-    },
-    Drawn {
-        name: "second-normal-stress",
-        label: "*N*_{2} / shear stress",
-        is_logarithmic: false,
-        of: |means| means[5].map(|number| number / means[0][0]),
-        known: || vec![curve("Dai et al. (2013)", |phi| -4.4 * phi.powi(3), 45)],
-    },
-    Drawn {
-        name: "particle-pressure",
-        label: "particle pressure / viscous stress",
-        is_logarithmic: true,
-        of: |means| means[6],
-        known: Vec::new,
-    },
+const DRAWN: [DrawnMean; 5] = [
+    DrawnMean::new("viscosity", "relative viscosity", true, |means| means[0]).beside(closures),
+    SHARE_OF_CONTACTS,
+    DrawnMean::new("first-normal-stress", "*N*_{1} / shear stress", false, |means| over_viscosity(means, 4))
+        .beside(|| vec![curve("Dai et al. (2013)", |phi| -0.8 * phi.powi(3), 45)]),
+    DrawnMean::new("second-normal-stress", "*N*_{2} / shear stress", false, |means| over_viscosity(means, 5))
+        .beside(|| vec![curve("Dai et al. (2013)", |phi| -4.4 * phi.powi(3), 45)]),
+    PARTICLE_PRESSURE,
 ];
 
 fn closures() -> Vec<(String, Vec<(f64, f64)>)> {
@@ -110,37 +63,8 @@ fn closures() -> Vec<(String, Vec<(f64, f64)>)> {
 }
 
 fn findings(done: &[Done]) -> anyhow::Result<Findings> {
-    let mut rows = Vec::new();
-    let mut series: Vec<Vec<StudySeries>> = DRAWN
-        .iter()
-        .map(|_| FRICTIONS.iter().map(|friction| StudySeries::new(friction.1)).collect())
-        .collect();
-    for run in done {
-        let Some((begin, estimates)) = steady(run, &COLUMNS)? else { continue };
-        let means: Vec<[f64; 2]> = estimates.iter().map(|one| [one.mean, one.half_width]).collect();
-        let place = FRICTIONS.iter().position(|(_, model)| *model == run.point.model).unwrap_or(0);
-        for (series, drawn) in series.iter_mut().zip(&DRAWN) {
-            let [mean, half_width] = (drawn.of)(&means);
-            series[place].points.push((run.point.at, mean, half_width));
-        }
-        let numbers =
-            [run.point.at, FRICTIONS[place].0, begin].into_iter().chain(means.as_flattened().iter().copied());
-        let Tally { halved_steps, .. } = run.report.tally;
-        let cells = run.report.cells_per_radius.map_or(String::new(), |cells| format!("{cells:.2}"));
-        let resolved = if estimates[0].is_resolved { "yes" } else { "no" };
-        let ends = [resolved.to_owned(), cells, halved_steps.to_string()];
-        rows.push(numbers.map(|x| format!("{x:.4}")).chain(ends).collect());
-    }
-    let drawing = |(series, drawn): (Vec<StudySeries>, &Drawn)| {
-        let picture =
-            draw("volume fraction *φ*", drawn.label, drawn.is_logarithmic, &series, (drawn.known)());
-        (drawn.name, picture)
-    };
-    let drawings = series.into_iter().zip(&DRAWN).map(drawing).collect();
-    let columns = "phi,friction,strain_skipped,viscosity,viscosity_half_width,viscosity_by_dissipation,viscosity_by_dissipation_half_width,\
-                   viscosity_of_contacts,viscosity_of_contacts_half_width,viscosity_of_friction,viscosity_of_friction_half_width,\
-                   N1,N1_half_width,N2,N2_half_width,particle_pressure,particle_pressure_half_width,blocks_independent,cells_per_radius,halved_steps";
-    Ok(Findings { columns, rows, drawings, remarks: remarks() })
+    let models = FRICTIONS.map(|(_, model)| model);
+    Ok(Findings { remarks: remarks(), ..rough_findings(done, &ACROSS, &models, &DRAWN)? })
 }
 
 fn remarks() -> Vec<String> {

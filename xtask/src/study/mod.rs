@@ -8,9 +8,12 @@ mod findings;
 mod friction;
 mod page;
 mod point;
+mod reversal;
 mod reversibility;
+mod rough;
 mod settling;
 mod steady;
+mod thickening;
 mod viscosity;
 
 use std::num::NonZeroUsize;
@@ -32,6 +35,10 @@ pub enum Name {
     Viscosity,
     /// Rheology of rough spheres with friction against their fraction.
     Friction,
+    /// Viscosity of smooth and rough spheres after the shear is reversed.
+    Reversal,
+    /// Viscosity of spheres whose friction has a critical load, against the shear rate.
+    Thickening,
     /// Particles that do not come back in an oscillating shear, against its amplitude.
     Reversibility,
     /// Settling velocity of spheres against their fraction.
@@ -59,6 +66,8 @@ impl Name {
         match self {
             Self::Viscosity => viscosity::STUDY,
             Self::Friction => friction::STUDY,
+            Self::Reversal => reversal::STUDY,
+            Self::Thickening => thickening::STUDY,
             Self::Reversibility => reversibility::STUDY,
             Self::Settling => settling::STUDY,
         }

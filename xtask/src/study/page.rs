@@ -23,10 +23,11 @@ pub fn effort(done: &[Done], wall_s: f64) -> String {
     format!("{cells}<p>{count} runs of {all} in all; this command took {own}. gluey {version}.</p>\n")
 }
 
-/// The table as CSV.
+/// The table as CSV; names lose their commas.
 pub fn csv(findings: &Findings) -> String {
-    let rows = findings.rows.iter().map(|row| row.join(",") + "\n");
-    findings.columns.to_owned() + "\n" + &rows.collect::<String>()
+    let line =
+        |row: &Vec<String>| row.iter().map(|cell| cell.replace(',', "")).collect::<Vec<_>>().join(",") + "\n";
+    findings.columns.clone() + "\n" + &findings.rows.iter().map(line).collect::<String>()
 }
 
 /// The page.

@@ -37,6 +37,8 @@ pub struct Done {
     pub trajectory: NumberTable,
     /// The rheology, where there is one.
     pub rheology: Option<NumberTable>,
+    /// What each step cost, and its contacts.
+    pub steps: NumberTable,
 }
 
 impl StudyPoint {
@@ -50,6 +52,12 @@ impl StudyPoint {
     pub fn with(mut self, key: &str, value: impl std::fmt::Display) -> Self {
         self.set.push(format!("{key}={value}"));
         self
+    }
+
+    /// The same with rough contact of this friction.
+    #[must_use]
+    pub fn rough(self, friction: f64) -> Self {
+        self.with("contact.strategy", "rough").with("contact.friction", format!("{friction:?}"))
     }
 
     /// The case.
@@ -73,6 +81,7 @@ impl StudyPoint {
             report,
             trajectory: table(&paths.csv())?,
             rheology: rheology.transpose()?,
+            steps: table(&paths.solver())?,
             case,
         })
     }

@@ -20,7 +20,9 @@ const LUBRICATION: &str = "lubrication";
 const GLUEY: &str = "gluey";
 const ROUGH: &str = "gluey, rough";
 const INELASTIC: &str = "inelastic";
-const MODELS: [&str; 4] = [LUBRICATION, GLUEY, ROUGH, INELASTIC];
+/// Rough contact with films and friction, whose forces act in the flow.
+const FRICTIONS: [(&str, f64); 2] = [("rough, friction 0", 0.0), ("rough, friction 0.5", 0.5)];
+const MODELS: [&str; 6] = [LUBRICATION, GLUEY, ROUGH, INELASTIC, FRICTIONS[0].0, FRICTIONS[1].0];
 /// Floor of gamma of rough discs and spheres, in squares of the radius. Discs are hardly pressed: at no
 /// amplitude do they come to -0.05.
 const ROUGHNESS: [f64; 2] = [-0.002, -0.05];
@@ -30,8 +32,8 @@ pub const STUDY: Study = Study {
     text: "Thirty discs at an area fraction of 0.55 and twelve spheres at 0.4 in a box whose shear strain goes to &gamma;<sub>0</sub>, to \
            &minus;&gamma;<sub>0</sub> and back, again and again. Stokes flow is reversible: whatever does not come back is due to \
            contacts, or to time steps. Shown is the share of particles that are more than 0.05 radii from where they were a cycle \
-           before, mean of the second half of the cycles, and their root mean square displacement in a cycle. Four models: lubrication \
-           forces and no contact; and without lubrication forces the gluey contact, the gluey contact of rough particles, whose memory \
+           before, mean of the second half of the cycles, and their root mean square displacement in a cycle. Six models: lubrication \
+           forces and no contact; lubrication forces and contact of surfaces with a roughness of 0.005 radii, with friction 0 and 0.5; and without lubrication forces the gluey contact, the gluey contact of rough particles, whose memory \
            does not fall below &minus;0.002 a&sup2; (discs, which are hardly pressed) and &minus;0.05 a&sup2; (spheres), and inelastic contact. Experiments with spheres (Pine et al. 2005, \
            10.1038/nature04380) find that they come back up to an amplitude of about 0.14 &phi;<sup>&minus;1.93</sup>, 0.8 at 0.4; \
            particles of models without contact memory come to rest in arrangements without collisions below such an amplitude.",
@@ -53,10 +55,13 @@ fn points(quick: bool) -> Vec<StudyPoint> {
 }
 
 fn point(place: usize, model: &'static str, amplitude: f64, cycles: usize) -> StudyPoint {
-    let name = format!("{}d-{}-{amplitude}", place + 2, model.replace(", ", "-"));
+    let name = format!("{}d-{}-{amplitude}", place + 2, model.replace(", ", "-").replace(' ', "-"));
     let point = StudyPoint::new(name, model, amplitude, FILES[place])
         .with("time.strain_amplitude", amplitude)
         .with("time.end", 4.0 * amplitude * cycles as f64);
+    if let Some((_, friction)) = FRICTIONS.iter().find(|(name, _)| *name == model) {
+        return point.rough(*friction);
+    }
     match model {
         LUBRICATION => point.with("contact.strategy", "none").with("flow.lubrication", "deficit"),
         INELASTIC => point.with("contact.strategy", "inelastic").with("flow.lubrication", "none"),
@@ -116,22 +121,24 @@ fn findings(done: &[Done]) -> anyhow::Result<Findings> {
                 [format!("{}", run.point.at), format!("{share:.3}"), format!("{distance:.2e}"), smallest];
             let Tally { closed_films, halved_steps, .. } = run.report.tally;
             let counts = [closed_films, halved_steps].map(|count| count.to_string());
-            let model = run.point.model.replace(',', "");
-            rows.push([dimension.to_string(), model].into_iter().chain(numbers).chain(counts).collect());
-            if let Some(place) = MODELS.iter().position(|model| *model == run.point.model) {
-                shares[place].points.push((run.point.at, share, 0.0));
-                distances[place].points.push((run.point.at, distance, 0.0));
-            }
+            let StudyPoint { model, at, .. } = run.point;
+            let model_of = [dimension.to_string(), model.to_owned()];
+            rows.push(model_of.into_iter().chain(numbers).chain(counts).collect());
+            StudySeries::add(&mut shares, model, (at, share, 0.0));
+            StudySeries::add(&mut distances, model, (at, distance, 0.0));
         }
         if shares.iter().all(|series| series.points.is_empty()) {
             continue;
         }
         let (x, of) = ("amplitude of the strain *γ*_{0}", if dimension == 2 { "discs" } else { "spheres" });
-        drawings.push((names[0], draw(x, &format!("share of {of} away"), false, &shares, Vec::new())));
-        drawings.push((names[1], draw(x, "displacement in a cycle / *a*", true, &distances, Vec::new())));
+        let away = format!("share of {of} away");
+        drawings.push((names[0], draw([x, &away], [false; 2], &shares, Vec::new())));
+        let distance = "displacement in a cycle / *a*";
+        drawings.push((names[1], draw([x, distance], [false, true], &distances, Vec::new())));
     }
     let columns = "dimension,model,amplitude,share_away,rms_over_a,min_gap_over_a,\
-                   closed_films,halved_steps";
+                   closed_films,halved_steps"
+        .to_owned();
     Ok(Findings { columns, rows, drawings, remarks: Vec::new() })
 }
 

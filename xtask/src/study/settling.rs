@@ -3,11 +3,11 @@
 use std::f64::consts::PI;
 
 use gluey_verify::literature::{settling_lost_in_box, settling_of_spheres};
-use gluey_verify::statistics::{mean, scatter};
 
 use super::drawing::{StudySeries, curve, draw};
 use super::findings::{Findings, Study};
 use super::point::{Done, StudyPoint};
+use super::steady::mean_of_runs;
 
 const FILE: &str = "settling.toml";
 const MODEL: &str = "equilibrium";
@@ -58,7 +58,7 @@ fn findings(done: &[Done]) -> anyhow::Result<Findings> {
     for phi in fractions {
         let runs: Vec<&Done> = done.iter().filter(|run| run.point.at == phi).collect();
         let velocities = runs.iter().map(|run| velocity(run)).collect::<Result<Vec<_>, _>>()?;
-        let (mean, error) = (mean(&velocities), scatter(&velocities) / (velocities.len() as f64).sqrt());
+        let (mean, error) = mean_of_runs(&velocities);
         let lost = settling_lost_in_box(phi, runs[0].case.particles.len());
         let numbers = [phi, mean, mean + lost, error, settling_of_spheres(phi)].map(|x| format!("{x:.4}"));
         rows.push([velocities.len().to_string()].into_iter().chain(numbers).collect());
@@ -69,8 +69,8 @@ fn findings(done: &[Done]) -> anyhow::Result<Findings> {
         StudySeries { label: "20 spheres, corrected for the box".to_owned(), points: corrected },
         StudySeries { label: "20 spheres in their box".to_owned(), points: in_box },
     ];
-    let columns = "configurations,phi,in_box,corrected,standard_error,polynomial";
-    let drawing = draw("volume fraction *φ*", "settling velocity", false, &series, known());
+    let columns = "configurations,phi,in_box,corrected,standard_error,polynomial".to_owned();
+    let drawing = draw(["volume fraction *φ*", "settling velocity"], [false; 2], &series, known());
     Ok(Findings { columns, rows, drawings: vec![("settling", drawing)], remarks: Vec::new() })
 }
 

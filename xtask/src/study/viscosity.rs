@@ -104,21 +104,21 @@ fn findings(done: &[Done]) -> anyhow::Result<Findings> {
         let Tally { closed_films, halved_steps, .. } = run.report.tally;
         let ends = [resolved.to_owned(), smallest, closed_films.to_string(), halved_steps.to_string()];
         rows.push([run.point.model.to_owned()].into_iter().chain(numbers).chain(ends).collect());
-        if let Some(place) = MODELS.iter().position(|model| *model == run.point.model) {
-            for (series, (k, ..)) in drawn.iter_mut().zip(DRAWN) {
-                series[place].points.push((run.point.at, estimates[k].mean, estimates[k].half_width));
-            }
+        for (series, (k, ..)) in drawn.iter_mut().zip(DRAWN) {
+            let point = (run.point.at, estimates[k].mean, estimates[k].half_width);
+            StudySeries::add(series, run.point.model, point);
         }
     }
     let drawing = |(series, (k, name, label)): (&[StudySeries; 4], (usize, &'static str, &str))| {
         let known = if k == 0 { known() } else { Vec::new() };
-        (name, draw("volume fraction *φ*", label, k == 0, series, known))
+        (name, draw(["volume fraction *φ*", label], [false, k == 0], series, known))
     };
     let mut drawings: Vec<_> = drawn.iter().zip(DRAWN).map(drawing).collect();
     // The page begins with the last one.
     drawings.rotate_right(1);
     let columns = "model,phi,strain_skipped,viscosity,viscosity_half_width,viscosity_of_contacts,N1,N1_half_width,N2,N2_half_width,\
-                   blocks_independent,min_gap_over_a,closed_films,halved_steps";
+                   blocks_independent,min_gap_over_a,closed_films,halved_steps"
+        .to_owned();
     Ok(Findings { columns, rows, drawings, remarks: remarks() })
 }
 
