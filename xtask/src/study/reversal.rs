@@ -36,7 +36,7 @@ pub const STUDY: Study = Study {
 };
 
 fn points(quick: bool) -> Vec<StudyPoint> {
-    let (fractions, seeds) = if quick { (&FRACTIONS[..1], 2) } else { (&FRACTIONS[..], SEEDS) };
+    let (fractions, seeds) = if quick { (&FRACTIONS[1..], 2) } else { (&FRACTIONS[..], SEEDS) };
     let mut points = Vec::new();
     for &(fraction, _) in fractions {
         for (model, friction) in MODELS {
@@ -50,9 +50,9 @@ fn points(quick: bool) -> Vec<StudyPoint> {
                     Some(friction) => point.rough(friction),
                     None => point.with("contact.strategy", "none"),
                 };
-                let [at, end] = if quick { [0.4, 0.8] } else { [REVERSED_AT, END] };
+                let [at, end] = if quick { [2.0, 3.5] } else { [REVERSED_AT, END] };
                 let point = point.with("time.reverse_at", at).with("time.end", end);
-                points.push(if quick { point.with("suspension.count", 8) } else { point });
+                points.push(if quick { point.with("suspension.count", 20) } else { point });
             }
         }
     }
@@ -68,8 +68,8 @@ fn bins(run: &Done) -> anyhow::Result<Vec<[f64; 3]>> {
     let rows = (0..t.len().saturating_sub(1)).filter(|row| begin(row) > -BEFORE - 1e-6);
     let mean = |rows: &[usize]| {
         let sum = |numbers: &[f64]| rows.iter().map(|row| numbers[*row]).sum::<f64>();
-        let whole = sum(viscosity);
-        [begin(&rows[0]) + 0.5 * BIN, whole / rows.len() as f64, sum(contacts) / whole]
+        let (count, whole) = (rows.len() as f64, sum(viscosity));
+        [sum(t) / count - at, whole / count, sum(contacts) / whole]
     };
     Ok(rows.collect::<Vec<_>>().chunk_by(|a, b| begin(a) == begin(b)).map(mean).collect())
 }
@@ -89,14 +89,17 @@ fn findings(done: &[Done]) -> anyhow::Result<Findings> {
     let (mut rows, mut drawings) = (Vec::new(), Vec::new());
     for (fraction, names) in FRACTIONS {
         let mut series = [(); 2].map(|()| MODELS.map(|(model, _)| StudySeries::new(model)));
-        for (model, _) in MODELS {
+        for (place, (model, _)) in MODELS.into_iter().enumerate() {
+            // Points of a bin stand side by side.
+            let aside = 0.2 * BIN * (place as f64 - 1.0);
             let runs = done.iter().filter(|run| run.point.at == fraction && run.point.model == model);
             let runs = runs.map(bins).collect::<Result<Vec<_>, _>>()?;
             for [viscosity, share] in means(&runs) {
-                StudySeries::add(&mut series[0], model, viscosity);
-                StudySeries::add(&mut series[1], model, share);
+                for (series, (strain, mean, error)) in series.iter_mut().zip([viscosity, share]) {
+                    StudySeries::add(series, model, (strain + aside, mean, error));
+                }
                 let numbers = [fraction, viscosity.0, viscosity.1, viscosity.2, share.1, share.2];
-                let numbers = numbers.map(|x| format!("{x:.4}")).into_iter();
+                let numbers = numbers.map(|x| format!("{:.4}", x + 0.0)).into_iter();
                 rows.push([model.to_owned(), runs.len().to_string()].into_iter().chain(numbers).collect());
             }
         }

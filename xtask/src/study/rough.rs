@@ -57,7 +57,7 @@ impl DrawnMean {
         Self { known, ..self }
     }
 
-    /// Draws points; series that lie at 0 or nowhere on a logarithmic axis are limits, lines from side to side.
+    /// Draws points; series at 0 or infinity of a logarithmic axis are limits, lines from side to side.
     fn draw(&self, across: &Across, mut series: Vec<StudySeries>) -> (&'static str, gluey_pictures::Canvas) {
         let mut known = (self.known)();
         if across.is_logarithmic {
@@ -66,7 +66,7 @@ impl DrawnMean {
             };
             let limits: Vec<_> = series.extract_if(.., is_limit).collect();
             let places = || series.iter().flat_map(|series| &series.points).map(|point| point.0);
-            let ends = [places().fold(f64::INFINITY, f64::min), places().fold(0.0, f64::max)];
+            let ends = [places().fold(f64::INFINITY, f64::min) / 2.0, places().fold(0.0, f64::max) * 2.0];
             let line = |y: f64| ends.map(|x| (x, y)).to_vec();
             known.extend(limits.iter().map(|limit| (limit.label.clone(), line(limit.points[0].1))));
         }

@@ -36,7 +36,7 @@ fn points(quick: bool) -> Vec<StudyPoint> {
             .with("suspension.volume_fraction", 0.5)
             .rough(friction)
             .with("contact.friction_load", format!("{load:?}"));
-        if quick { point.with("suspension.count", 8).with("time.end", 0.4) } else { point }
+        if quick { point.with("suspension.count", 20).with("time.end", 2.0) } else { point }
     };
     chosen.map(point).collect()
 }
@@ -48,7 +48,7 @@ const ACROSS: Across = Across {
 };
 
 const DRAWN: [DrawnMean; 6] = [
-    DrawnMean::new("viscosity", "relative viscosity", true, |means| means[0]),
+    DrawnMean::new("viscosity", "relative viscosity", false, |means| means[0]),
     SHARE_OF_CONTACTS,
     DrawnMean::new("share-of-friction", "share of friction in the viscosity", false, |means| {
         over_viscosity(means, 3)
