@@ -22,6 +22,9 @@ const KNOWN: [Stroke; 4] = [
     Stroke { color: "#111", width: 1.2, dashes: Some("4 2") },
 ];
 
+/// Known curves with their labels.
+pub type Known = Vec<(String, Vec<(f64, f64)>)>;
+
 /// A quantity with its error, at many places.
 #[derive(Clone, Debug)]
 pub struct StudySeries {
@@ -51,12 +54,7 @@ pub fn curve(label: &str, function: fn(f64) -> f64, last: u32) -> (String, Vec<(
 
 /// Series and known curves over a pair of axes, each logarithmic or not; an upright one that is leaves out
 /// what is not positive.
-pub fn draw(
-    labels: [&str; 2],
-    is_logarithmic: [bool; 2],
-    series: &[StudySeries],
-    known: Vec<(String, Vec<(f64, f64)>)>,
-) -> Canvas {
+pub fn draw(labels: [&str; 2], is_logarithmic: [bool; 2], series: &[StudySeries], known: Known) -> Canvas {
     let mut curves: Vec<Curve> = Vec::new();
     for ((label, points), stroke) in known.into_iter().zip(KNOWN) {
         curves.push(Curve { label: Some(label), stroke, pieces: vec![points] });

@@ -4,7 +4,7 @@ use gluey_verify::literature::{
     boyer_viscosity, eilers_viscosity, maron_pierce_viscosity, zarraga_viscosity,
 };
 
-use super::drawing::curve;
+use super::drawing::{Known, curve};
 use super::findings::{Findings, Study};
 use super::point::{Done, StudyPoint};
 use super::rough::{Across, DrawnMean, PARTICLE_PRESSURE, SHARE_OF_CONTACTS, over_viscosity, rough_findings};
@@ -53,7 +53,7 @@ const DRAWN: [DrawnMean; 5] = [
     PARTICLE_PRESSURE,
 ];
 
-fn closures() -> Vec<(String, Vec<(f64, f64)>)> {
+fn closures() -> Known {
     vec![
         curve("Eilers, 0.64", |phi| eilers_viscosity(phi, 0.64), 50),
         curve("Maron-Pierce, 0.585", |phi| maron_pierce_viscosity(phi, 0.585), 50),

@@ -50,9 +50,9 @@ fn points(quick: bool) -> Vec<StudyPoint> {
                     Some(friction) => point.rough(friction),
                     None => point.with("contact.strategy", "none"),
                 };
-                let [at, end] = if quick { [2.0, 3.5] } else { [REVERSED_AT, END] };
+                let [at, end] = if quick { [1.0, 1.6] } else { [REVERSED_AT, END] };
                 let point = point.with("time.reverse_at", at).with("time.end", end);
-                points.push(if quick { point.with("suspension.count", 20) } else { point });
+                points.push(if quick { point.with("suspension.count", 12) } else { point });
             }
         }
     }

@@ -25,7 +25,9 @@ const FRICTIONS: [(&str, f64); 2] = [("rough, friction 0", 0.0), ("rough, fricti
 const MODELS: [&str; 6] = [LUBRICATION, GLUEY, ROUGH, INELASTIC, FRICTIONS[0].0, FRICTIONS[1].0];
 /// Floor of gamma of rough discs and spheres, in squares of the radius. Discs are hardly pressed: at no
 /// amplitude do they come to -0.05.
-const ROUGHNESS: [f64; 2] = [-0.002, -0.05];
+const FLOORS: [f64; 2] = [-0.002, -0.05];
+/// Roughness of surfaces in contact, discs and spheres, in radii. Films keep discs farther than 0.005 apart.
+const ROUGHNESS: [f64; 2] = [0.01, 0.005];
 
 pub const STUDY: Study = Study {
     title: "Who comes back in an oscillating shear",
@@ -33,7 +35,7 @@ pub const STUDY: Study = Study {
            &minus;&gamma;<sub>0</sub> and back, again and again. Stokes flow is reversible: whatever does not come back is due to \
            contacts, or to time steps. Shown is the share of particles that are more than 0.05 radii from where they were a cycle \
            before, mean of the second half of the cycles, and their root mean square displacement in a cycle. Six models: lubrication \
-           forces and no contact; lubrication forces and contact of surfaces with a roughness of 0.005 radii, with friction 0 and 0.5; and without lubrication forces the gluey contact, the gluey contact of rough particles, whose memory \
+           forces and no contact; lubrication forces and contact of surfaces with a roughness of 0.01 radii (discs, which films keep farther than 0.005 apart) and 0.005 (spheres), with friction 0 and 0.5; and without lubrication forces the gluey contact, the gluey contact of rough particles, whose memory \
            does not fall below &minus;0.002 a&sup2; (discs, which are hardly pressed) and &minus;0.05 a&sup2; (spheres), and inelastic contact. Experiments with spheres (Pine et al. 2005, \
            10.1038/nature04380) find that they come back up to an amplitude of about 0.14 &phi;<sup>&minus;1.93</sup>, 0.8 at 0.4; \
            particles of models without contact memory come to rest in arrangements without collisions below such an amplitude.",
@@ -60,7 +62,7 @@ fn point(place: usize, model: &'static str, amplitude: f64, cycles: usize) -> St
         .with("time.strain_amplitude", amplitude)
         .with("time.end", 4.0 * amplitude * cycles as f64);
     if let Some((_, friction)) = FRICTIONS.iter().find(|(name, _)| *name == model) {
-        return point.rough(*friction);
+        return point.rough(*friction).with("contact.roughness", ROUGHNESS[place]);
     }
     match model {
         LUBRICATION => point.with("contact.strategy", "none").with("flow.lubrication", "deficit"),
@@ -68,7 +70,7 @@ fn point(place: usize, model: &'static str, amplitude: f64, cycles: usize) -> St
         _ => {
             let point = point.with("contact.strategy", "gluey").with("flow.lubrication", "none");
             if model == ROUGH {
-                point.with("contact.gamma_min", ROUGHNESS[place] * radius(place).powi(2))
+                point.with("contact.gamma_min", FLOORS[place] * radius(place).powi(2))
             } else {
                 point
             }

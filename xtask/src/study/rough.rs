@@ -2,7 +2,7 @@
 
 use gluey::Tally;
 
-use super::drawing::{StudySeries, draw};
+use super::drawing::{Known, StudySeries, draw};
 use super::findings::Findings;
 use super::point::Done;
 use super::steady::{CONTACTS, steady};
@@ -26,7 +26,7 @@ pub struct DrawnMean {
     label: &'static str,
     is_logarithmic: bool,
     of: fn(&[[f64; 2]]) -> [f64; 2],
-    known: fn() -> Vec<(String, Vec<(f64, f64)>)>,
+    known: fn() -> Known,
 }
 
 pub const SHARE_OF_CONTACTS: DrawnMean =
@@ -53,7 +53,7 @@ impl DrawnMean {
     }
 
     /// The same beside known curves.
-    pub const fn beside(self, known: fn() -> Vec<(String, Vec<(f64, f64)>)>) -> Self {
+    pub const fn beside(self, known: fn() -> Known) -> Self {
         Self { known, ..self }
     }
 

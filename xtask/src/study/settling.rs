@@ -4,7 +4,7 @@ use std::f64::consts::PI;
 
 use gluey_verify::literature::{settling_lost_in_box, settling_of_spheres};
 
-use super::drawing::{StudySeries, curve, draw};
+use super::drawing::{Known, StudySeries, curve, draw};
 use super::findings::{Findings, Study};
 use super::point::{Done, StudyPoint};
 use super::steady::mean_of_runs;
@@ -74,7 +74,7 @@ fn findings(done: &[Done]) -> anyhow::Result<Findings> {
     Ok(Findings { columns, rows, drawings: vec![("settling", drawing)], remarks: Vec::new() })
 }
 
-fn known() -> Vec<(String, Vec<(f64, f64)>)> {
+fn known() -> Known {
     vec![
         curve("equilibrium", settling_of_spheres, 45),
         curve("1 − 6.55 *φ*", |phi| 1.0 - 6.55 * phi, 12),

@@ -5,7 +5,7 @@ use std::f64::consts::PI;
 use gluey::Tally;
 use gluey_verify::literature::viscosity_of_spheres;
 
-use super::drawing::{StudySeries, curve, draw};
+use super::drawing::{Known, StudySeries, curve, draw};
 use super::findings::{Findings, Study};
 use super::point::{Done, StudyPoint};
 use super::steady::steady;
@@ -122,7 +122,7 @@ fn findings(done: &[Done]) -> anyhow::Result<Findings> {
     Ok(Findings { columns, rows, drawings, remarks: remarks() })
 }
 
-fn known() -> Vec<(String, Vec<(f64, f64)>)> {
+fn known() -> Known {
     vec![
         curve("equilibrium", viscosity_of_spheres, 46),
         curve("1 + 2.5 *φ* + 7.6 *φ*^{2}", |phi| 1.0 + 2.5 * phi + 7.6 * phi * phi, 30),
