@@ -133,7 +133,11 @@ impl Chart {
         let [x, y] = apart.map(|apart| apart.map(|(_, axis)| axis));
         let x = x.unwrap_or_else(|| self.x.clone()).with_room(frame_width, false);
         let y = y.unwrap_or_else(|| self.y.clone()).with_room(frame_height, true);
-        let plots: Vec<Plot> = self.curves.iter().flat_map(|curve| self.plots(curve, powers)).collect();
+        let mut plots: Vec<Plot> = self.curves.iter().flat_map(|curve| self.plots(curve, powers)).collect();
+        if plots.is_empty() {
+            // Without a plot kuva draws no frame.
+            plots.push(LinePlot::new().into());
+        }
         let mut layout = Layout::new((x.min, x.max), (y.min, y.max))
             .with_width(width)
             .with_height(height)
@@ -293,6 +297,15 @@ fn place_of_label(dot: (f64, f64), taken: &[(f64, f64)]) -> (f64, f64) {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn points_alone_have_a_frame_with_ticks() {
+        let stroke = Stroke { color: "black", width: 1.0, dashes: None };
+        let curve = Curve { label: None, stroke, pieces: vec![vec![(0.2, 0.3)], vec![(0.7, 0.9)]] };
+        let axis = || Axis::around("", [0.0, 1.0]);
+        let chart = Chart { x: axis(), y: axis(), curves: vec![curve], notes: Vec::new(), marks: Vec::new() };
+        assert!(chart.svg(400.0, 300.0).contains(">0.4<"));
+    }
 
     #[test]
     fn labels_keep_away_from_curves() {

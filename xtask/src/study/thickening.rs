@@ -36,7 +36,7 @@ fn points(quick: bool) -> Vec<StudyPoint> {
             .with("suspension.volume_fraction", 0.5)
             .rough(friction)
             .with("contact.friction_load", format!("{load:?}"));
-        if quick { point.with("suspension.count", 12).with("time.end", 1.0) } else { point }
+        if quick { point.with("suspension.count", 8).with("time.end", 0.4) } else { point }
     };
     chosen.map(point).collect()
 }
