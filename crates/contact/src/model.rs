@@ -179,6 +179,12 @@ pub struct ContactForce<const D: usize> {
 }
 
 impl<const D: usize> ContactForce<D> {
+    /// A force of which nothing else is known.
+    pub(crate) fn known(pair: PairKey, normal: Vector<D>, force: Vector<D>) -> Self {
+        let (branch, slip) = (Vector::zeros(), Vector::zeros());
+        Self { pair, normal, force, branch, slip, gap: 0.0, floor: 0.0, slides: false }
+    }
+
     /// The normal force, positive apart.
     pub fn pressing(&self) -> f64 {
         self.normal.dot(&self.force)

@@ -306,9 +306,9 @@ impl<const D: usize> FlowContact<D> {
                 let slides = held >= (1.0 - AT_EDGE) * most;
                 report.contact.sliding_count += usize::from(slides);
                 let slip = touch.across(&touch.velocity(&outcome.twists));
-                let (pair, normal, branch) = (touch.pair, touch.normal, touch.branch());
-                let floor = self.smallest_gap(pair, step.radii);
-                forces.push(ContactForce { pair, normal, force: *force, branch, slip, gap, floor, slides });
+                let (branch, floor) = (touch.branch(), self.smallest_gap(touch.pair, step.radii));
+                let known = ContactForce::known(touch.pair, touch.normal, *force);
+                forces.push(ContactForce { branch, slip, gap, floor, slides, ..known });
             }
         }
         report.change = if change > 0.0 { (change / size).sqrt() } else { 0.0 };
@@ -469,16 +469,7 @@ impl<const D: usize> ContactModel<D> for FlowContact<D> {
     fn resume(&mut self, state: ContactState) -> Result<(), MemoryError> {
         let mut state = state.checked()?;
         let vector = |numbers: &[f64; 3]| Vector::<D>::from_fn(|d, _| numbers[d]);
-        let force = |state: ForceState| ContactForce {
-            pair: state.pair,
-            normal: vector(&state.normal),
-            force: vector(&state.force),
-            branch: Vector::zeros(),
-            slip: Vector::zeros(),
-            gap: 0.0,
-            floor: 0.0,
-            slides: false,
-        };
+        let force = |one: ForceState| ContactForce::known(one.pair, vector(&one.normal), vector(&one.force));
         self.forces = std::mem::take(&mut state.in_flow).into_iter().map(force).collect();
         self.repelled[0] = std::mem::take(&mut state.repelled);
         self.memory = state;
