@@ -55,6 +55,25 @@ fn spheres_keep_their_roughness_and_their_power() {
     crowds_keep_their_roughness_and_their_power::<3>(0.3, ROUGHNESS, 0.11);
 }
 
+/// Twelve spheres at 0.5 jam in their box: contacts stick and slip in turn, and the usual iteration for their
+/// forces does not end. Another one does, in whole steps.
+#[test]
+fn forces_are_found_where_spheres_jam() {
+    let case = case(
+        "name = \"jam\"\ndimension = 3\ndomain = { boundary = \"sheared\" }\n\
+         suspension = { volume_fraction = 0.5, count = 12, seed = 1, min_gap = 0.006 }\n\
+         contact = { strategy = \"rough\", roughness = 0.005, friction = 0.5 }\n\
+         time = { step = 0.02, end = 0.4 }\n[flow.mesh]\ncells_per_radius = 1.0",
+    );
+    let (parts, contacts) = ran(&case, |csv| {
+        let solver = beside(csv, "solver");
+        (column(&solver, "parts"), column(&solver, "active_contacts"))
+    });
+    println!("{contacts:?}");
+    assert!(parts.iter().all(|parts| *parts == 1.0), "{parts:?}");
+    assert!(contacts.last().is_some_and(|count| *count > 15.0), "{contacts:?}");
+}
+
 #[test]
 fn runs_resume_bit_by_bit() {
     runs::resumes_bit_by_bit(&crowd(3, "end = 0.22, reverse_at = 0.18"), 7, &["rheology"]);

@@ -244,8 +244,8 @@ pub struct ContactReport {
     pub pair_count: usize,
     /// Pairs with a force.
     pub active_count: usize,
-    /// Those of them whose friction is all that their cone allows: they slip, all of them without friction. None
-    /// where forces do not act in the flow.
+    /// Those of them whose friction is all that their cone allows: they slip, all of them without friction.
+    /// None where forces do not act in the flow.
     pub sliding_count: usize,
     /// The smallest gap among the pairs that took part.
     pub worst: Option<WorstPair>,

@@ -14,6 +14,7 @@
 //! the step is beyond it acts in the mobility alone, and so do steps that are as long as they like.
 
 mod anderson;
+mod course;
 mod near;
 mod pair_repulsion;
 mod params;

@@ -52,7 +52,7 @@ pub struct FlowContactParams {
     pub viscosity: f64,
     /// Change of the forces in a last iteration over their size, by the power that they have.
     pub tolerance: f64,
-    /// Iterations at most.
+    /// Iterations at most; careful ones, where these do not end, may be 20 times as many.
     pub iteration_limit: usize,
 }
 
@@ -81,7 +81,7 @@ impl Default for FlowContactParams {
             friction: Friction { coefficient: Self::FRICTION, load: 0.0 },
             viscosity: 1.0,
             tolerance: 1e-10,
-            iteration_limit: 5000,
+            iteration_limit: 2000,
         }
     }
 }

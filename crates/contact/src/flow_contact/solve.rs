@@ -12,18 +12,14 @@
 
 use gluey_geom::{Twist, Vector, Wrench};
 
-use super::anderson::Anderson;
+use super::course::{Course, Pace};
 use super::params::FlowContactParams;
 use super::touch::Touch;
 use crate::solver::ResidualHistory;
 use crate::{BodyStep, TwistMobility};
 
-/// Steps that the acceleration remembers.
-const WINDOW: usize = 10;
 /// Gaps are known to so many times the rounding of positions.
 const NOISE: f64 = 16.0;
-/// The acceleration begins anew where a residual is so many times the smallest so far.
-const GROWTH: f64 = 10.0;
 
 /// Forces between pairs that may touch, in a step from motions without them.
 pub(super) struct Coulomb<'a, const D: usize> {
@@ -32,6 +28,7 @@ pub(super) struct Coulomb<'a, const D: usize> {
     pub params: &'a FlowContactParams,
     /// The rate by which forces count, over that of the critical load.
     pub rate: f64,
+    pub pace: Pace,
     pub mobility: &'a mut dyn TwistMobility<D>,
     /// Motions without the forces.
     pub free: &'a [Twist<D>],
@@ -92,8 +89,8 @@ pub(super) struct Stalled {
 impl<const D: usize> Coulomb<'_, D> {
     /// The forces on the partners, from a guess.
     pub fn solve(&mut self, forces: &mut [PairForce<D>]) -> Result<Outcome<D>, Stalled> {
-        let mut anderson = Anderson::new(WINDOW);
-        let (mut history, mut least) = (Vec::new(), f64::INFINITY);
+        let mut course = Course::new(self.pace);
+        let mut history = Vec::new();
         for iterations in 0usize.. {
             let twists = self.twists(forces);
             let asked: Vec<PairForce<D>> = self
@@ -105,7 +102,7 @@ impl<const D: usize> Coulomb<'_, D> {
             let changes: Vec<PairForce<D>> =
                 asked.iter().zip(&*forces).map(|(asked, force)| asked.minus(force)).collect();
             let change = self.weighted(&changes);
-            let (change_size, size) = (norm(&change), norm(&self.weighted(forces)));
+            let (change_size, size) = (self.pace.softness() * norm(&change), norm(&self.weighted(forces)));
             let residual = if change_size > 0.0 { change_size / size.max(f64::MIN_POSITIVE) } else { 0.0 };
             if iterations == 0 || iterations.is_power_of_two() {
                 history.push((iterations, residual));
@@ -116,18 +113,13 @@ impl<const D: usize> Coulomb<'_, D> {
                 }
                 return Ok(Outcome { twists, iterations, residual });
             }
-            if iterations == self.params.iteration_limit || residual.is_nan() {
+            if iterations == self.pace.iteration_limit(self.params) || residual.is_nan() {
                 let of_pair = |k: usize| changes[k].total(&self.touches[k]).norm();
                 let worst = (0..forces.len()).max_by(|&a, &b| of_pair(a).total_cmp(&of_pair(b))).unwrap_or(0);
                 let history = ResidualHistory { entries: history };
                 return Err(Stalled { residual, iterations, history, worst });
             }
-            if change_size > GROWTH * least {
-                anderson.restart();
-                least = change_size;
-            }
-            least = least.min(change_size);
-            let next = anderson.next(flat(&asked), change);
+            let next = course.next(change_size, forces, flat(&asked), change);
             for (k, (force, next)) in forces.iter_mut().zip(next.chunks_exact(D + 1)).enumerate() {
                 let (touch, contact) = (&self.touches[k], Vector::from_column_slice(&next[..D]));
                 let pressing = touch.normal.dot(&contact);
@@ -160,8 +152,8 @@ impl<const D: usize> Coulomb<'_, D> {
 
     /// The force that a pair asks for where motions with `force` are these.
     fn asked(&self, touch: &Touch<D>, force: &PairForce<D>, twists: &[Twist<D>]) -> PairForce<D> {
-        let across = touch.compliance[1];
-        let yielding = touch.compliance[0] * self.step.velocity_weight;
+        let [along, across] = touch.compliance.map(|compliance| compliance * self.pace.softness());
+        let yielding = along * self.step.velocity_weight;
         let gap = touch.gap_after(self.step, twists);
         let slip = touch.across(&touch.velocity(twists));
         let pressing = touch.normal.dot(&force.contact);
@@ -209,7 +201,7 @@ fn drop_parted<const D: usize>(forces: &mut [PairForce<D>], asked: &[PairForce<D
 }
 
 /// Components of the contacts' forces, and repulsion.
-fn flat<const D: usize>(forces: &[PairForce<D>]) -> Vec<f64> {
+pub(super) fn flat<const D: usize>(forces: &[PairForce<D>]) -> Vec<f64> {
     forces.iter().flat_map(|force| force.contact.iter().copied().chain([force.excess])).collect()
 }
 
