@@ -6,7 +6,6 @@
 
 use super::anderson::Anderson;
 use super::params::FlowContactParams;
-use super::solve::{PairForce, flat};
 
 /// Steps that the acceleration remembers.
 const WINDOW: usize = 10;
@@ -57,13 +56,7 @@ impl Course {
     }
 
     /// Where to go on from `forces`, for which pairs ask for `asked`; `change` is the difference, weighted.
-    pub fn next<const D: usize>(
-        &mut self,
-        residual: f64,
-        forces: &[PairForce<D>],
-        asked: Vec<f64>,
-        change: Vec<f64>,
-    ) -> Vec<f64> {
+    pub fn next(&mut self, residual: f64, forces: &[f64], asked: Vec<f64>, change: Vec<f64>) -> Vec<f64> {
         if self.pace == Pace::Usual {
             if residual > GROWTH * self.least {
                 self.anderson.restart();
@@ -77,14 +70,14 @@ impl Course {
             if self.count < PLAIN {
                 return asked;
             }
-            self.begin(residual, flat(forces));
+            self.begin(residual, forces.to_vec());
             return self.anderson.next(asked, change);
         };
         if self.count < FAST {
             return self.anderson.next(asked, change);
         }
         if residual <= 0.5 * self.least {
-            self.begin(residual, flat(forces));
+            self.begin(residual, forces.to_vec());
             return self.anderson.next(asked, change);
         }
         let saved = saved.clone();

@@ -119,7 +119,7 @@ impl<const D: usize> Coulomb<'_, D> {
                 let history = ResidualHistory { entries: history };
                 return Err(Stalled { residual, iterations, history, worst });
             }
-            let next = course.next(change_size, forces, flat(&asked), change);
+            let next = course.next(change_size, &flat(forces), flat(&asked), change);
             for (k, (force, next)) in forces.iter_mut().zip(next.chunks_exact(D + 1)).enumerate() {
                 let (touch, contact) = (&self.touches[k], Vector::from_column_slice(&next[..D]));
                 let pressing = touch.normal.dot(&contact);
@@ -201,7 +201,7 @@ fn drop_parted<const D: usize>(forces: &mut [PairForce<D>], asked: &[PairForce<D
 }
 
 /// Components of the contacts' forces, and repulsion.
-pub(super) fn flat<const D: usize>(forces: &[PairForce<D>]) -> Vec<f64> {
+fn flat<const D: usize>(forces: &[PairForce<D>]) -> Vec<f64> {
     forces.iter().flat_map(|force| force.contact.iter().copied().chain([force.excess])).collect()
 }
 
