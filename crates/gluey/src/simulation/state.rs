@@ -28,6 +28,6 @@ pub struct SimulationState<const D: usize> {
     pub repelling: ContactState,
     /// Memory of the contact model.
     pub contact: ContactState,
-    /// Warm start of the flow, as [`Hydrodynamics::checkpoint`] gave it.
+    /// Warm start of the flow, as [`gluey_motion::Hydrodynamics::checkpoint`] gave it.
     pub hydrodynamics: Vec<u8>,
 }
