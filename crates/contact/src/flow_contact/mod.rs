@@ -19,6 +19,7 @@ mod near;
 mod pair_repulsion;
 mod params;
 mod solve;
+mod sweeps;
 mod touch;
 
 use std::f64::consts::PI;
@@ -227,10 +228,9 @@ impl<const D: usize> FlowContact<D> {
 
     /// The pairs with a force or a memory, sorted.
     fn known_forces(&self) -> Vec<KnownForce<D>> {
-        let of_contact = |force: &ContactForce<D>| (force.pair, force.force);
         let remembered = self.memory.pairs.iter().map(|state| state.pair);
         let remembered = remembered.chain(self.repelled[0].iter().map(|(pair, _)| *pair));
-        let forces = self.forces.iter().map(of_contact);
+        let forces = self.forces.iter().map(|force| (force.pair, force.force));
         let mut known: Vec<_> = forces.chain(remembered.map(|pair| (pair, Vector::zeros()))).collect();
         // Stable: forces come first.
         known.sort_by_key(|(pair, _)| *pair);

@@ -2,7 +2,6 @@
 
 use gluey_geom::Twist;
 
-use super::course::Pace;
 use super::params::FlowContactParams;
 use super::solve::{Coulomb, Outcome, PairForce, resolution};
 use super::touch::Touch;
@@ -61,15 +60,10 @@ impl<const D: usize> NearPairs<D> {
         loop {
             let chosen: Vec<usize> = (0..self.touches.len()).filter(|&k| self.takes_part[k]).collect();
             let touches: Vec<Touch<D>> = chosen.iter().map(|&k| self.touches[k]).collect();
-            let guess: Vec<PairForce<D>> = chosen.iter().map(|&k| self.forces[k]).collect();
-            let mut forces = guess.clone();
-            let (pace, mobility) = (Pace::Usual, &mut *mobility);
-            let mut problem = Coulomb { step, touches: &touches, params, rate, pace, mobility, free };
-            let outcome = problem.solve(&mut forces).or_else(|_| {
-                problem.pace = Pace::Careful;
-                forces = guess;
-                problem.solve(&mut forces)
-            });
+            let mut forces: Vec<PairForce<D>> = chosen.iter().map(|&k| self.forces[k]).collect();
+            let mobility = &mut *mobility;
+            let mut problem = Coulomb { step, touches: &touches, params, rate, mobility, free };
+            let outcome = problem.solve(&mut forces);
             let outcome = outcome.map_err(|stalled| ContactError::NotConverged {
                 residual: stalled.residual,
                 tolerance: params.tolerance,

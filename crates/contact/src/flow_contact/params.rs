@@ -52,7 +52,7 @@ pub struct FlowContactParams {
     pub viscosity: f64,
     /// Change of the forces in a last iteration over their size, by the power that they have.
     pub tolerance: f64,
-    /// Iterations at most; careful ones, where these do not end, may be 20 times as many.
+    /// Iterations at most.
     pub iteration_limit: usize,
 }
 

@@ -12,7 +12,7 @@
 
 use gluey_geom::{Twist, Vector, Wrench};
 
-use super::course::{Course, Pace};
+use super::course::Course;
 use super::params::FlowContactParams;
 use super::touch::Touch;
 use crate::solver::ResidualHistory;
@@ -28,7 +28,6 @@ pub(super) struct Coulomb<'a, const D: usize> {
     pub params: &'a FlowContactParams,
     /// The rate by which forces count, over that of the critical load.
     pub rate: f64,
-    pub pace: Pace,
     pub mobility: &'a mut dyn TwistMobility<D>,
     /// Motions without the forces.
     pub free: &'a [Twist<D>],
@@ -49,13 +48,20 @@ impl<const D: usize> PairForce<D> {
         Self { contact, excess: 0.0 }
     }
 
-    fn minus(&self, other: &Self) -> Self {
+    /// The difference of two.
+    pub fn minus(&self, other: &Self) -> Self {
         Self { contact: self.contact - other.contact, excess: self.excess - other.excess }
     }
 
     /// Contact and repulsion.
-    fn total(&self, touch: &Touch<D>) -> Vector<D> {
+    pub fn total(&self, touch: &Touch<D>) -> Vector<D> {
         self.contact + touch.normal * self.excess
+    }
+
+    /// Components of the contact's force, and repulsion.
+    pub fn numbers(&self) -> impl Iterator<Item = f64> + use<D> {
+        let numbers: [f64; D] = self.contact.into();
+        numbers.into_iter().chain([self.excess])
     }
 
     /// Numbers whose squares are powers.
@@ -86,48 +92,93 @@ pub(super) struct Stalled {
     pub worst: usize,
 }
 
+/// How a pair moves.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct PairMotion<const D: usize> {
+    /// The gap at the end of the step.
+    pub gap: f64,
+    /// Velocity of the partner's surface beyond that of the particle's.
+    pub velocity: Vector<D>,
+}
+
+/// What forces do.
+pub(super) struct State<const D: usize> {
+    /// Motions with the forces.
+    pub twists: Vec<Twist<D>>,
+    /// How pairs move.
+    pub motions: Vec<PairMotion<D>>,
+    /// The forces that pairs ask for.
+    pub asked: Vec<PairForce<D>>,
+    /// What these are beyond the forces, as numbers whose squares are powers.
+    pub change: Vec<f64>,
+    /// Size of the change, over that of the forces.
+    pub residual: f64,
+}
+
 impl<const D: usize> Coulomb<'_, D> {
     /// The forces on the partners, from a guess.
     pub fn solve(&mut self, forces: &mut [PairForce<D>]) -> Result<Outcome<D>, Stalled> {
-        let mut course = Course::new(self.pace);
+        let mut course = Course::new();
         let mut history = Vec::new();
         for iterations in 0usize.. {
-            let twists = self.twists(forces);
-            let asked: Vec<PairForce<D>> = self
-                .touches
-                .iter()
-                .zip(&*forces)
-                .map(|(touch, force)| self.asked(touch, force, &twists))
-                .collect();
-            let changes: Vec<PairForce<D>> =
-                asked.iter().zip(&*forces).map(|(asked, force)| asked.minus(force)).collect();
-            let change = self.weighted(&changes);
-            let (change_size, size) = (self.pace.softness() * norm(&change), norm(&self.weighted(forces)));
-            let residual = if change_size > 0.0 { change_size / size.max(f64::MIN_POSITIVE) } else { 0.0 };
+            let state = self.state(forces);
+            let residual = state.residual;
             if iterations == 0 || iterations.is_power_of_two() {
                 history.push((iterations, residual));
             }
-            if residual <= self.params.tolerance || change_size <= self.noise() {
-                if drop_parted(forces, &asked) {
+            if residual <= self.params.tolerance || norm(&state.change) <= self.noise() {
+                if drop_parted(forces, &state.asked) {
                     continue;
                 }
-                return Ok(Outcome { twists, iterations, residual });
+                return Ok(Outcome { twists: state.twists, iterations, residual });
             }
-            if iterations == self.pace.iteration_limit(self.params) || residual.is_nan() {
-                let of_pair = |k: usize| changes[k].total(&self.touches[k]).norm();
+            if iterations == self.params.iteration_limit || residual.is_nan() {
+                let of_pair = |k: usize| state.asked[k].minus(&forces[k]).total(&self.touches[k]).norm();
                 let worst = (0..forces.len()).max_by(|&a, &b| of_pair(a).total_cmp(&of_pair(b))).unwrap_or(0);
                 let history = ResidualHistory { entries: history };
                 return Err(Stalled { residual, iterations, history, worst });
             }
-            let next = course.next(change_size, &flat(forces), flat(&asked), change);
-            for (k, (force, next)) in forces.iter_mut().zip(next.chunks_exact(D + 1)).enumerate() {
-                let (touch, contact) = (&self.touches[k], Vector::from_column_slice(&next[..D]));
-                let pressing = touch.normal.dot(&contact);
-                let contact = self.admitted(touch, pressing, touch.across(&contact));
-                *force = PairForce { contact, excess: next[D] };
-            }
+            course.go_on(self, forces, state);
         }
         unreachable!("the loop ends by itself")
+    }
+
+    /// What these forces do.
+    pub fn state(&mut self, forces: &[PairForce<D>]) -> State<D> {
+        let twists = self.twists(forces);
+        let motion = |touch: &Touch<D>| PairMotion {
+            gap: touch.gap_after(self.step, &twists),
+            velocity: touch.velocity(&twists),
+        };
+        let motions: Vec<PairMotion<D>> = self.touches.iter().map(motion).collect();
+        let parts = self.touches.iter().zip(forces).zip(&motions);
+        let asked = parts.map(|((touch, force), motion)| self.asked(touch, force, touch.compliance, motion));
+        let asked: Vec<PairForce<D>> = asked.collect();
+        let changes: Vec<PairForce<D>> =
+            asked.iter().zip(forces).map(|(asked, force)| asked.minus(force)).collect();
+        let change = self.weighted(&changes);
+        let (change_size, size) = (norm(&change), norm(&self.weighted(forces)));
+        let residual = if change_size > 0.0 { change_size / size.max(f64::MIN_POSITIVE) } else { 0.0 };
+        State { twists, motions, asked, change, residual }
+    }
+
+    /// Sets forces from the numbers of all, each within its cone.
+    pub fn set(&self, forces: &mut [PairForce<D>], numbers: &[f64]) {
+        for ((force, touch), next) in forces.iter_mut().zip(self.touches).zip(numbers.chunks_exact(D + 1)) {
+            let contact = Vector::from_column_slice(&next[..D]);
+            let pressing = touch.normal.dot(&contact);
+            let contact = self.admitted(touch, pressing, touch.across(&contact));
+            *force = PairForce { contact, excess: next[D] };
+        }
+    }
+
+    /// The motions that a force on the partner of a pair adds.
+    pub fn response(&mut self, touch: &Touch<D>, force: &Vector<D>) -> Vec<Twist<D>> {
+        let mut loads = vec![Wrench::default(); self.free.len()];
+        touch.add_to(force, &mut loads);
+        let mut twists = vec![Twist::default(); loads.len()];
+        self.mobility.respond(&loads, &mut twists);
+        twists
     }
 
     /// The size of changes that positions do not resolve.
@@ -150,12 +201,17 @@ impl<const D: usize> Coulomb<'_, D> {
         twists
     }
 
-    /// The force that a pair asks for where motions with `force` are these.
-    fn asked(&self, touch: &Touch<D>, force: &PairForce<D>, twists: &[Twist<D>]) -> PairForce<D> {
-        let [along, across] = touch.compliance.map(|compliance| compliance * self.pace.softness());
+    /// The force that a pair asks for which yields like this and moves like this with `force`.
+    pub fn asked(
+        &self,
+        touch: &Touch<D>,
+        force: &PairForce<D>,
+        [along, across]: [f64; 2],
+        motion: &PairMotion<D>,
+    ) -> PairForce<D> {
         let yielding = along * self.step.velocity_weight;
-        let gap = touch.gap_after(self.step, twists);
-        let slip = touch.across(&touch.velocity(twists));
+        let gap = motion.gap;
+        let slip = touch.across(&motion.velocity);
         let pressing = touch.normal.dot(&force.contact);
         let free = gap + yielding * (touch.least - pressing - force.excess);
         let mut excess = touch.repulsion.map_or(0.0, |law| law.excess(free, yielding));
@@ -198,11 +254,6 @@ fn drop_parted<const D: usize>(forces: &mut [PairForce<D>], asked: &[PairForce<D
         }
     }
     is_any
-}
-
-/// Components of the contacts' forces, and repulsion.
-fn flat<const D: usize>(forces: &[PairForce<D>]) -> Vec<f64> {
-    forces.iter().flat_map(|force| force.contact.iter().copied().chain([force.excess])).collect()
 }
 
 fn norm(x: &[f64]) -> f64 {

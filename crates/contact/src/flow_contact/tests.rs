@@ -4,10 +4,13 @@ use std::f64::consts::PI;
 
 use gluey_geom::{Dim, Pose, Spin, Twist, Vector};
 
+use super::solve::{Coulomb, PairForce};
+use super::sweeps::Sweeps;
+use super::touch::Touch;
 use super::{FlowContact, FlowContactParams, Friction, NormalLaw};
 use crate::{
     BodyStep, ContactForce, ContactLaw, ContactModel, ContactParams, Domain, FlowForces, GammaUpdate,
-    LoneDrag, PairContact, Repulsion, Wall,
+    LoneDrag, PairContact, Repulsion, TwistMobility, Wall,
 };
 
 const DT: f64 = 1e-3;
@@ -222,4 +225,51 @@ fn repulsion_and_contact_share_a_push() {
         let excess = law.at::<3>(0.015, RADII) - law.at::<3>(0.05, RADII);
         assert!((force.norm() + excess - 0.3 * push).abs() < 0.03 * push, "{force} {excess} {push}");
     }
+}
+
+/// Eight spheres at the corners of a cube that a flow presses together and shears: sweeps from nothing end, at
+/// the motions of the accelerated iteration.
+#[test]
+fn sweeps_find_the_forces_of_the_acceleration() {
+    let place = |k: usize| Vector::<3>::from_fn(|d, _| 2.01 * (k >> d & 1) as f64);
+    let poses: Vec<Pose<3>> = (0..8).map(|k| Pose::at(place(k))).collect();
+    let (radii, drift) = (vec![1.0; 8], vec![Twist::default(); 8]);
+    let step = BodyStep { poses: &poses, radii: &radii, drift: &drift, velocity_weight: DT, dt: DT };
+    let inward = |pose: &Pose<3>| Twist {
+        velocity: Vector::<3>::repeat(1.005) - pose.position + Vector::<3>::x() * pose.position.y,
+        spin: Spin::<3>::new(0.0, 0.2, -0.5),
+    };
+    let free: Vec<Twist<3>> = poses.iter().map(inward).collect();
+    let params = rough(0.4);
+    let mut contact = FlowContact::new(params.clone(), Domain::default());
+    let mut drag = LoneDrag { viscosity: 1.0, radii: &radii, is_held: &[] };
+    let mut accelerated = free.clone();
+    contact.correct(&step, &mut drag, &mut accelerated).expect("forces");
+    let touch = |force: &ContactForce<3>| {
+        let mut touch = contact.touch(force.pair, &step).expect("a pair");
+        touch.compliance = TwistMobility::<3>::of_pair(&drag, force.pair);
+        touch
+    };
+    let touches: Vec<Touch<3>> = contact.forces().iter().map(touch).collect();
+    assert_eq!(touches.len(), 12);
+    let mut problem = Coulomb {
+        step: &step,
+        touches: &touches,
+        params: &params,
+        rate: 1.0,
+        mobility: &mut drag,
+        free: &free,
+    };
+    let sweeps = Sweeps::new(&mut problem).expect("few pairs");
+    let mut forces = vec![PairForce::of_contact(Vector::zeros()); touches.len()];
+    let mut residuals = Vec::new();
+    for _ in 0..20 {
+        let state = problem.state(&forces);
+        residuals.push(state.residual);
+        sweeps.improve(&problem, &mut forces, state.motions);
+    }
+    let last = problem.state(&forces);
+    assert!(last.residual < 1e-10, "{residuals:?}");
+    let off = last.twists.iter().zip(&accelerated).map(|(a, b)| (*a - *b).velocity.amax());
+    assert!(off.fold(0.0, f64::max) < 1e-8);
 }
