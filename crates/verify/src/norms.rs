@@ -106,10 +106,7 @@ pub fn superficial_velocity<const D: usize>(
             let images = in_cell(ball, &lower, h).into_iter();
             images.map(|image| (image, flats.iter().map(|flat| flat.in_cell(&image, h, 0.0)).collect()))
         });
-        let cuts =
-            |(_, flats): &(BallInCell<D>, Vec<FlatInCell<D>>)| !flats.iter().any(FlatInCell::takes_cell);
-        let mut near: Vec<(BallInCell<D>, Vec<FlatInCell<D>>)> = near.filter(cuts).collect();
-        near.iter_mut().for_each(|(ball, flats)| flats.retain(|f| !f.leaves_cell() && !f.leaves_ball(ball)));
+        let near: Vec<(BallInCell<D>, Vec<FlatInCell<D>>)> = near.collect();
         let volume = rules.moments(near.iter().map(|(ball, flats)| (ball, &flats[..]))).volume;
         let sum: Vector<D> =
             points.iter().zip(&volume).map(|((at, _), weight)| velocity_at(flow, index, at) * *weight).sum();

@@ -11,6 +11,8 @@ use super::intervals::Breakpoint;
 
 /// How far outside the body or the cell a corner may lie, by rounding.
 const SLACK: f64 = 1e-9;
+/// How far outside the body or the cell, in units of the cell, a point may lie whose square root is felt.
+const BESIDE: f64 = 1.0;
 /// Planes that meet at an angle below this are parallel.
 const PARALLEL: f64 = 1e-12;
 /// Angles nearer than this are one.
@@ -42,8 +44,11 @@ pub fn breakpoints(radius: f64, flats: &[HalfSpace], faces: &[HalfSpace; 4]) -> 
     corners.sort_by(f64::total_cmp);
     corners.dedup_by(|a, b| (*a - *b).abs() < SAME);
     let kinks = corners.into_iter().map(|at| Breakpoint { at, is_root: false });
+    let is_near =
+        |point: &Vector<3>| planes.iter().all(|plane| plane.normal.dot(point) <= plane.offset + BESIDE);
     let roots = planes.iter().flat_map(|plane| ends_of_section(plane, radius));
-    kinks.chain(roots.map(|at| Breakpoint { at, is_root: true })).collect()
+    let roots = roots.filter(|(point, _)| is_near(point));
+    kinks.chain(roots.map(|(_, at)| Breakpoint { at, is_root: true })).collect()
 }
 
 /// The points in which the edges of a cell along the height meet the sphere.
@@ -79,11 +84,17 @@ fn common_line(a: &HalfSpace, b: &HalfSpace) -> Option<(Vector<3>, Vector<3>)> {
     (sin > PARALLEL).then(|| (point, cross / sin))
 }
 
-/// The angles of the highest and the lowest point of the circle in which a plane meets the sphere.
-fn ends_of_section(flat: &HalfSpace, radius: f64) -> impl Iterator<Item = f64> {
-    let from_axis = flat.normal[0].hypot(flat.normal[1]).atan2(flat.normal[2]);
+/// The highest and the lowest point of the circle in which a plane meets the sphere, and their angles.
+fn ends_of_section(flat: &HalfSpace, radius: f64) -> impl Iterator<Item = (Vector<3>, f64)> {
+    let level = flat.normal.xy().norm();
+    let from_axis = level.atan2(flat.normal[2]);
     let half = (flat.offset / radius).acos();
     // Angles from the axis, which the edge may pass on its other side.
     let folded = (half + from_axis).min(2.0 * PI - half - from_axis);
-    [(half - from_axis).abs(), folded].into_iter().map(|angle| FRAC_PI_2 - angle).filter(|at| !at.is_nan())
+    let middle = flat.normal * flat.offset;
+    let up = (Vector::<3>::z() - flat.normal * flat.normal[2]) * (radius * half.sin() / level);
+    [(middle + up, (half - from_axis).abs()), (middle - up, folded)]
+        .into_iter()
+        .map(|(point, angle)| (point, FRAC_PI_2 - angle))
+        .filter(|(_, at)| !at.is_nan())
 }

@@ -66,9 +66,12 @@ impl AngleRule {
 }
 
 impl Rays {
-    /// One of them.
-    pub fn ray(&self, q: usize) -> Ray {
-        Ray { at: self.at[q], middle: self.middle[q], half: self.half[q], weight: self.weight[q] }
+    /// The ray through the middle of a disc, with this weight, and others of none.
+    pub fn through(disc: &Disc, weight: f64) -> Self {
+        let mut weights = [0.0; RAYS];
+        weights[0] = weight;
+        let half = disc.widths[0] * disc.radius;
+        Self { at: [disc.across; RAYS], middle: [disc.along; RAYS], half: [half; RAYS], weight: weights }
     }
 }
 

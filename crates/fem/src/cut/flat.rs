@@ -4,6 +4,8 @@ use super::ball::BallInCell;
 
 /// A plane this near to all of a face of the cell lies in the face. On either side of the face, cells agree.
 const ON_FACE: f64 = 1e-9;
+/// Steps of the search for the highest point that a ball has in the cell.
+const STEPS: usize = 16;
 
 /// A half-space `m . x <= offset` that a body does not leave, in coordinates in which the cell is the unit
 /// cube. Where the cell is sheared by `A`, `m = A^T n` for the unit normal `n`.
@@ -59,18 +61,75 @@ impl<const D: usize> FlatInCell<D> {
         self.offset - self.normal.iter().zip(&ball.center).map(|(m, c)| m * c).sum::<f64>()
     }
 
-    /// Whether the cell lies inside.
-    pub fn leaves_cell(&self) -> bool {
-        self.normal.iter().map(|n| n.max(0.0)).sum::<f64>() <= self.offset
+    /// Whether all that a ball has in a cell with this shear lies inside.
+    pub fn leaves(&self, ball: &BallInCell<D>, shear: f64) -> bool {
+        is_below(self.normal, self.offset, ball, shear)
     }
 
-    /// Whether the cell lies outside and does not touch the border.
-    pub fn takes_cell(&self) -> bool {
-        self.normal.iter().map(|n| n.min(0.0)).sum::<f64>() > self.offset
+    /// Whether nothing that a ball has in a cell with this shear lies inside or on the border.
+    pub fn takes(&self, ball: &BallInCell<D>, shear: f64) -> bool {
+        is_below(self.normal.map(|m| -m), -self.offset - ON_FACE, ball, shear)
     }
+}
 
-    /// Whether a ball lies inside.
-    pub fn leaves_ball(&self, ball: &BallInCell<D>) -> bool {
-        self.distance(ball) >= ball.radius
+/// Whether `m . x <= offset` is found to hold in all that a ball has in the cell.
+///
+/// For every `p`, `m . x <= sum_d max(0, m_d - p_d) + p . c + r |A^-T p|` there: a bound for the cell and one
+/// for the ball. The least is that of `p = l A^T A (x - c)` for the highest `x`, which maximises
+/// `m . x - l/2 |A (x - c)|^2` in the cell for one `l`.
+fn is_below<const D: usize>(m: [f64; D], offset: f64, ball: &BallInCell<D>, shear: f64) -> bool {
+    let mut covector = m;
+    covector[1] -= shear * m[0];
+    let length = covector.iter().map(|n| n * n).sum::<f64>().sqrt();
+    let center: f64 = (0..D).map(|d| m[d] * ball.center[d]).sum();
+    if m.iter().map(|m| m.max(0.0)).sum::<f64>() <= offset || center + ball.radius * length <= offset {
+        return true;
     }
+    let (mut low, mut high, mut l) = (0.0, f64::INFINITY, length / ball.radius);
+    for _ in 0..STEPS {
+        let arm = highest(&m, l, ball, shear);
+        let mut place = arm;
+        place[0] += shear * arm[1];
+        let distance = place.iter().map(|x| x * x).sum::<f64>().sqrt();
+        let mut pull = place.map(|x| l * x);
+        pull[1] += shear * pull[0];
+        let of_cell: f64 = (0..D).map(|d| (m[d] - pull[d]).max(0.0)).sum();
+        let of_ball: f64 = (0..D).map(|d| pull[d] * ball.center[d]).sum();
+        if of_cell + of_ball + ball.radius * l * distance <= offset {
+            return true;
+        }
+        if distance <= ball.radius {
+            if (0..D).map(|d| m[d] * (ball.center[d] + arm[d])).sum::<f64>() > offset {
+                return false;
+            }
+            high = l;
+        } else {
+            low = l;
+        }
+        l = if high == f64::INFINITY {
+            4.0 * l
+        } else if low == 0.0 {
+            0.25 * l
+        } else {
+            (low * high).sqrt()
+        };
+    }
+    false
+}
+
+/// The point of the cell, from the centre of the ball, in which `m . x - l/2 |A (x - c)|^2` is largest.
+fn highest<const D: usize>(m: &[f64; D], l: f64, ball: &BallInCell<D>, shear: f64) -> [f64; D] {
+    let mut arm = [0.0; D];
+    // Two coordinates depend on each other in a sheared cell; the bound holds wherever this stops.
+    for _ in 0..if shear == 0.0 { 1 } else { 4 } {
+        for d in 0..D {
+            let free = match d {
+                0 => m[0] / l - shear * arm[1],
+                1 => (m[1] / l - shear * arm[0]) / (1.0 + shear * shear),
+                _ => m[d] / l,
+            };
+            arm[d] = free.clamp(-ball.center[d], 1.0 - ball.center[d]);
+        }
+    }
+    arm
 }

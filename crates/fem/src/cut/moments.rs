@@ -99,11 +99,11 @@ impl<const D: usize> CutRules<D> {
     }
 
     fn inside(&self, ball: &BallInCell<D>, flats: &[FlatInCell<D>]) -> Inside<D> {
-        if flats.iter().any(FlatInCell::takes_cell) {
+        if flats.iter().any(|flat| flat.takes(ball, self.shear)) {
             return Inside::zeros();
         }
-        let matters = |flat: &&FlatInCell<D>| !flat.leaves_cell() && !flat.leaves_ball(ball);
-        let flats: Vec<FlatInCell<D>> = flats.iter().filter(matters).copied().collect();
+        let flats: Vec<FlatInCell<D>> =
+            flats.iter().filter(|flat| !flat.leaves(ball, self.shear)).copied().collect();
         let body = self.sections.of_body(ball, &flats);
         let mut inside = Inside::zeros();
         for axis in 0..D {

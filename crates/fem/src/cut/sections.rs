@@ -2,13 +2,13 @@
 
 use super::ball::BallInCell;
 use super::corners::HalfSpace;
-use super::disc::{AngleRule, Lanes, RAYS, Ray, Rays};
+use super::disc::{AngleRule, Lanes, RAYS, Rays};
 use super::flat::FlatInCell;
-use super::frame::SectionFrame;
+use super::frame::{FlatFrame, SectionFrame};
 use super::intervals::{Interval, Intervals};
 use super::polynomials::{Line, POINTS, Polynomials, integrals, legendre};
 use super::rays::{for_each_plane, parts_of_rays};
-use super::slice::{Edge, End, Slice};
+use super::slice::{Edge, Slice};
 use crate::element::gauss;
 use gluey_linalg::vectorised;
 
@@ -33,75 +33,60 @@ pub struct Body<const D: usize> {
 
 /// The rules and the frames of cells with the same shear.
 pub struct Sections<const D: usize> {
+    shear: f64,
     /// By the direction of the rays.
     frames: [SectionFrame; D],
     /// On parts of the angles of planes.
     heights: Vec<(f64, f64)>,
     /// On those of the angles of rays.
     angles: AngleRule,
+    /// On chords of flats, exact for products of two of the polynomials.
+    chords: [(f64, f64); POINTS],
     /// Of one direction.
     pub polynomials: Polynomials,
-}
-
-/// Sums that rays in one direction add to: Legendre sums, planes by their height.
-struct Sums {
-    volume: [Plane; POINTS],
-    flats: Vec<[Plane; POINTS]>,
 }
 
 impl<const D: usize> Sections<D> {
     /// For this shear.
     pub fn new(shear: f64) -> Self {
+        let rule = gauss(POINTS);
         Self {
+            shear,
             frames: std::array::from_fn(|direction| SectionFrame::new::<D>(shear, direction)),
             heights: gauss(RULE),
             angles: AngleRule::new(),
+            chords: std::array::from_fn(|k| rule[k]),
             polynomials: Polynomials::new(),
         }
     }
 
-    /// The integrals over a ball cut flat. Each flat is seen by the rays along its largest component.
+    /// The integrals over a ball cut flat.
     pub fn of_body(&self, ball: &BallInCell<D>, flats: &[FlatInCell<D>]) -> Body<D> {
-        let zeros = || vec![0.0; POINTS.pow(D as u32)];
         let mut parts = Intervals::default();
-        let mut body = Body {
-            volume: zeros(),
+        Body {
+            volume: self.volume(ball, flats, &mut parts),
             faces: std::array::from_fn(|axis| {
                 [0, 1].map(|side| self.face(ball, flats, [axis, side], &mut parts))
             }),
-            flats: flats.iter().map(|_| zeros()).collect(),
-        };
-        for direction in 0..D {
-            if direction > 0 && flats.iter().all(|flat| flat.main_axis() != direction) {
-                continue;
-            }
-            let sums = self.sums(ball, flats, direction, &mut parts);
-            if direction == 0 {
-                self.set(direction, &sums.volume, &mut body.volume);
-            }
-            for (k, sum) in sums.flats.iter().enumerate().filter(|(k, _)| flats[*k].main_axis() == direction)
-            {
-                self.set(direction, sum, &mut body.flats[k]);
-            }
+            flats: (0..flats.len()).map(|k| self.flat(ball, flats, k, &mut parts)).collect(),
         }
-        body
     }
 
-    /// The sums of the rays in a direction, plane by plane.
-    fn sums(
-        &self,
-        ball: &BallInCell<D>,
-        flats: &[FlatInCell<D>],
-        direction: usize,
-        parts: &mut Intervals,
-    ) -> Sums {
-        let frame = &self.frames[direction];
-        let zeros = [[[0.0; POINTS]; POINTS]; POINTS];
-        let mut sums = Sums { volume: zeros, flats: vec![zeros; flats.len()] };
+    /// The part in the cell, plane by plane.
+    fn volume(&self, ball: &BallInCell<D>, flats: &[FlatInCell<D>], parts: &mut Intervals) -> Vec<f64> {
+        let frame = &self.frames[0];
+        let mut sums = [[[0.0; POINTS]; POINTS]; POINTS];
+        let mut add = |slice: &Slice, layers: &[f64], parts: &mut Intervals| {
+            let parts = parts_of_rays(slice, parts);
+            vectorised(
+                #[inline(always)]
+                || add_layers(&self.plane(slice, parts), layers, &mut sums),
+            );
+        };
         if D == 2 {
             let slice = Slice { disc: frame.section(ball, 0.0).0, edges: edges(frame, flats, 0.0) };
-            self.add_plane(&slice, &[1.0], &mut sums, parts);
-            return sums;
+            add(&slice, &[1.0], parts);
+            return self.integrals(frame.axes, &sums);
         }
         let in_3d = ball.in_3d();
         let half_spaces: Vec<HalfSpace> =
@@ -110,38 +95,75 @@ impl<const D: usize> Sections<D> {
         for_each_plane(&in_3d, frame, &half_spaces, &self.heights, parts, |disc, z, width| {
             let slice = Slice { disc, edges: edges(frame, flats, z) };
             if !slice.is_empty() {
-                self.add_plane(&slice, &legendre(z).map(|p| p * width), &mut sums, &mut inner);
+                add(&slice, &legendre(z).map(|p| p * width), &mut inner);
             }
         });
-        sums
+        self.integrals(frame.axes, &sums)
     }
 
-    /// Adds the rays of a plane to layers with these weights.
-    fn add_plane(&self, slice: &Slice, layers: &[f64], sums: &mut Sums, parts: &mut Intervals) {
-        let Sums { volume, flats } = sums;
-        let of_flats = |ray: &Ray, ends: &[End; 2]| {
-            for end in ends.iter().filter(|end| end.is_in_cell) {
-                let Some((flat, share)) = end.flat else { continue };
-                let mut own = Plane::default();
-                add_product(&legendre(end.at), ray, share, &mut own);
-                add_layers(&own, layers, &mut flats[flat]);
-            }
+    /// A flat: its part `dA` as it is seen along the axis of the largest component `m_d` of its covector
+    /// belongs to `dA / |m_d|` of the flat.
+    fn flat(
+        &self,
+        ball: &BallInCell<D>,
+        flats: &[FlatInCell<D>],
+        k: usize,
+        parts: &mut Intervals,
+    ) -> Vec<f64> {
+        let mut sums = [[[0.0; POINTS]; POINTS]; POINTS];
+        let Some(frame) = FlatFrame::new(self.shear, ball, &flats[k]) else {
+            return vec![0.0; POINTS.pow(D as u32)];
         };
-        let parts = parts_of_rays(slice, parts);
+        let others = flats.iter().enumerate().filter(|other| other.0 != k).map(|other| frame.edge(other.1));
+        let slice = Slice { disc: frame.disc, edges: others.chain(frame.faces()).collect() };
+        if frame.is_in_cell() && !slice.is_empty() {
+            let share = 1.0 / flats[k].normal()[frame.axes[2]].abs();
+            if D == 2 {
+                self.add_flat(&frame, &slice, &Rays::through(&slice.disc, share), &mut sums);
+            } else {
+                for part in parts_of_rays(&slice, parts) {
+                    let mut rays = slice.disc.rays(part, &self.angles);
+                    rays.weight.iter_mut().for_each(|weight| *weight *= share);
+                    self.add_flat(&frame, &slice, &rays, &mut sums);
+                }
+            }
+        }
+        let [along, across, seen] = frame.axes;
+        self.integrals([along, seen, across], &sums)
+    }
+
+    /// Adds the rays of a part of a flat: layers across them, rows along the axis that it is seen along.
+    fn add_flat(&self, frame: &FlatFrame, slice: &Slice, rays: &Rays, sums: &mut [Plane; POINTS]) {
         vectorised(
             #[inline(always)]
-            || add_layers(&self.plane(slice, parts, of_flats), layers, volume),
+            || {
+                let [from, to] = slice.chords(rays);
+                for q in 0..RAYS {
+                    let mut plane = Plane::default();
+                    for (t, weight) in self.chords {
+                        let along = from[q] + (to[q] - from[q]) * t;
+                        let seen = frame.place - frame.slopes[0] * along - frame.slopes[1] * rays.at[q];
+                        let weight = weight * (to[q] - from[q]) * rays.weight[q];
+                        let [along, seen] = [legendre(along), legendre(seen).map(|p| p * weight)];
+                        for (row, seen) in plane.iter_mut().zip(&seen) {
+                            row.iter_mut().zip(&along).for_each(|(sum, along)| *sum += seen * along);
+                        }
+                    }
+                    let layers = legendre(rays.at[q]);
+                    add_layers(&plane, if D == 2 { &layers[..1] } else { &layers }, sums);
+                }
+            },
         );
     }
 
     /// The sums of the chords of a plane.
     #[inline(always)]
-    fn plane(&self, slice: &Slice, parts: &[Interval], mut visit: impl FnMut(&Ray, &[End; 2])) -> Plane {
+    fn plane(&self, slice: &Slice, parts: &[Interval]) -> Plane {
         // By ray of a part.
         let mut sums = [[[0.0; RAYS]; POINTS]; POINTS];
         for part in parts {
             let rays = slice.disc.rays(part, &self.angles);
-            add_chords(&slice.chords(&rays, &mut visit), &rays, &mut sums);
+            add_chords(&slice.chords(&rays), &rays, &mut sums);
         }
         sums.map(
             #[inline(always)]
@@ -162,8 +184,7 @@ impl<const D: usize> Sections<D> {
         if D == 2 {
             let slice = Slice { disc: frame.section(ball, 0.0).0, edges: edges(frame, flats, 0.0) };
             let ends = slice.disc.ray_at(place).and_then(|ray| slice.ends(&ray));
-            let ends = ends.map_or([0.0; 2], |ends| ends.map(|end| end.at));
-            face[..POINTS].copy_from_slice(&chord(ends));
+            face[..POINTS].copy_from_slice(&chord(ends.unwrap_or([0.0; 2])));
             self.polynomials.convert(&mut face[..POINTS], 1);
             return face;
         }
@@ -178,7 +199,7 @@ impl<const D: usize> Sections<D> {
         let parts = parts_of_rays(&slice, parts);
         let plane = vectorised(
             #[inline(always)]
-            || self.plane(&slice, parts, |_, _| ()),
+            || self.plane(&slice, parts),
         );
         // The rays of the second axis run along the last one, across the first.
         let is_turned = axis == 1;
@@ -191,31 +212,35 @@ impl<const D: usize> Sections<D> {
         face
     }
 
-    /// Writes the sums of rays in a direction as integrals of the Lagrange polynomials.
-    fn set(&self, direction: usize, sums: &[Plane; POINTS], to: &mut [f64]) {
-        let [along, across, height] = self.frames[direction].axes.map(|axis| POINTS.pow(axis as u32));
+    /// The integrals of the Lagrange polynomials from Legendre sums with rows, columns and layers along these
+    /// axes.
+    fn integrals(&self, axes: [usize; 3], sums: &[Plane; POINTS]) -> Vec<f64> {
+        let mut integrals = vec![0.0; POINTS.pow(D as u32)];
+        let [along, across, height] = axes.map(|axis| POINTS.pow(axis as u32));
         let layers = if D == 2 { 1 } else { POINTS };
         for (k, plane) in sums[..layers].iter().enumerate() {
             for (j, row) in plane.iter().enumerate() {
-                row.iter().enumerate().for_each(|(i, &sum)| to[i * along + j * across + k * height] = sum);
+                for (i, &sum) in row.iter().enumerate() {
+                    integrals[i * along + j * across + k * height] = sum;
+                }
             }
         }
-        (0..D as u32).for_each(|axis| self.polynomials.convert(to, POINTS.pow(axis)));
+        (0..D as u32).for_each(|axis| self.polynomials.convert(&mut integrals, POINTS.pow(axis)));
+        integrals
     }
 }
 
 /// The flats in a plane of rays.
 fn edges<const D: usize>(frame: &SectionFrame, flats: &[FlatInCell<D>], place: f64) -> Vec<Edge> {
     let [along, across, height] = frame.axes;
-    let edge = |(k, flat): (usize, &FlatInCell<D>)| {
+    let edge = |flat: &FlatInCell<D>| {
         let normal = flat.normal();
         Edge {
             normal: [along, across].map(|d| normal[d]),
             offset: flat.offset() - if D == 3 { normal[height] * place } else { 0.0 },
-            flat: (flat.main_axis() == along).then(|| (k, 1.0 / normal[along].abs())),
         }
     };
-    flats.iter().enumerate().map(edge).collect()
+    flats.iter().map(edge).collect()
 }
 
 /// Integrals over the part of an interval in the cell, zero if there is none.
@@ -253,15 +278,6 @@ fn add_chords([from, to]: &[Lanes; 2], rays: &Rays, sums: &mut [[Lanes; POINTS];
 fn sum_of_lanes(lanes: Lanes) -> f64 {
     let [a, b, c, d, e, f, g, h] = lanes;
     ((a + e) + (c + g)) + ((b + f) + (d + h))
-}
-
-/// `sum += factor along across^T` for the polynomials across a ray.
-fn add_product(along: &Line, ray: &Ray, factor: f64, sum: &mut Plane) {
-    let across = legendre(ray.at);
-    for (row, across) in sum.iter_mut().zip(across) {
-        let factor = factor * ray.weight * across;
-        row.iter_mut().zip(along).for_each(|(sum, along)| *sum += factor * along);
-    }
 }
 
 #[inline(always)]

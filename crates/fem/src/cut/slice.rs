@@ -3,9 +3,6 @@
 //! What planes leave of a ball is convex, so that a ray is inside between two ends: the last entry and the
 //! first exit, each on the ball or on a flat. The moments of a plane change their form at the rays through
 //! corners, where two of circle, lines and faces meet.
-//!
-//! The part `dA` of a plane across an axis `d` of the cell through which a flat with the covector `m` is seen
-//! belongs to the part `dA / |m_d|` of the flat.
 
 use super::disc::{Disc, Lanes, RAYS, Ray, Rays};
 
@@ -22,8 +19,6 @@ pub struct Edge {
     pub normal: [f64; 2],
     /// Where the half-plane ends.
     pub offset: f64,
-    /// For a flat that is integrated over by these rays its number, and its part for one across the rays.
-    pub flat: Option<(usize, f64)>,
 }
 
 /// The section of a ball cut flat with a plane of rays.
@@ -35,61 +30,46 @@ pub struct Slice {
     pub edges: Vec<Edge>,
 }
 
-/// Point where a ray enters or leaves.
-#[derive(Clone, Copy, Debug)]
-pub struct End {
-    /// Coordinate along the ray.
-    pub at: f64,
-    /// See [`Edge::flat`]; nothing on the ball.
-    pub flat: Option<(usize, f64)>,
-    /// Whether this piece of surface belongs to the cell.
-    pub is_in_cell: bool,
-}
-
 impl Slice {
     /// The ends of a ray, if it meets what the flats leave.
-    ///
-    /// A flat on a face of the cell belongs to the cell on its outer side, where the fluid is.
     #[inline]
-    pub fn ends(&self, ray: &Ray) -> Option<[End; 2]> {
-        let on_ball = |sign: f64| End { at: ray.middle + sign * ray.half, flat: None, is_in_cell: false };
-        let [mut entry, mut exit] = [-1.0, 1.0].map(on_ball);
+    pub fn ends(&self, ray: &Ray) -> Option<[f64; 2]> {
+        let [mut entry, mut exit] = [ray.middle - ray.half, ray.middle + ray.half];
         for edge in &self.edges {
             // Infinite for an edge along the rays, which keeps or drops the whole ray.
             let at = (edge.offset - edge.normal[1] * ray.at) / edge.normal[0].abs();
-            if edge.normal[0] >= 0.0 && at < exit.at {
-                exit = End { at, flat: edge.flat, is_in_cell: (0.0..1.0).contains(&at) };
-            } else if edge.normal[0] < 0.0 && -at > entry.at {
-                entry = End { at: -at, flat: edge.flat, is_in_cell: 0.0 < -at && -at <= 1.0 };
+            if edge.normal[0] >= 0.0 && at < exit {
+                exit = at;
+            } else if edge.normal[0] < 0.0 && -at > entry {
+                entry = -at;
             }
         }
-        (entry.at <= exit.at).then_some([entry, exit])
+        (entry <= exit).then_some([entry, exit])
     }
 
-    /// The chords of rays in the unit interval, empty for rays that miss; `visit` gets the ends of each ray
-    /// whose section is cut flat.
+    /// The chords of rays in the unit interval, empty for rays that miss.
     #[inline(always)]
-    pub fn chords(&self, rays: &Rays, mut visit: impl FnMut(&Ray, &[End; 2])) -> [Lanes; 2] {
-        let mut chords = [[0.0; RAYS]; 2];
+    pub fn chords(&self, rays: &Rays) -> [Lanes; 2] {
+        let [mut from, mut to] = [[0.0; RAYS]; 2];
         for q in 0..RAYS {
-            chords[0][q] = rays.middle[q] - rays.half[q];
-            chords[1][q] = rays.middle[q] + rays.half[q];
+            from[q] = rays.middle[q] - rays.half[q];
+            to[q] = rays.middle[q] + rays.half[q];
         }
-        if !self.edges.is_empty() {
+        for edge in &self.edges {
             for q in 0..RAYS {
-                let ray = rays.ray(q);
-                let ends = self.ends(&ray);
-                ends.iter().for_each(|ends| visit(&ray, ends));
-                let ends = ends.map_or([0.0; 2], |ends| ends.map(|end| end.at));
-                (chords[0][q], chords[1][q]) = (ends[0], ends[1]);
+                let at = (edge.offset - edge.normal[1] * rays.at[q]) / edge.normal[0].abs();
+                if edge.normal[0] >= 0.0 {
+                    to[q] = if at < to[q] { at } else { to[q] };
+                } else {
+                    from[q] = if -at > from[q] { -at } else { from[q] };
+                }
             }
         }
-        let [from, to] = &mut chords;
-        for (from, to) in from.iter_mut().zip(to) {
-            *from = from.clamp(0.0, 1.0);
-            *to = to.min(1.0).max(*from);
+        for q in 0..RAYS {
+            from[q] = from[q].clamp(0.0, 1.0);
+            to[q] = to[q].min(1.0).max(from[q]);
         }
-        chords
+        [from, to]
     }
 
     /// Whether one of the lines leaves nothing of the disc.
@@ -126,15 +106,15 @@ impl Slice {
     /// for a flat parallel to the plane.
     fn distance(&self, line: &Edge) -> f64 {
         let ([x, y], [u, v]) = (line.normal, self.round_normal(line));
-        (line.offset - x * self.disc.along - y * self.disc.across) / u.hypot(v)
+        (line.offset - x * self.disc.along - y * self.disc.across) / length([u, v])
     }
 
     /// The points of the unit circle, for the round section, where a line cuts it; not numbers if it does
     /// not.
     fn ends_on_line(&self, line: &Edge) -> [[f64; 2]; 2] {
         let [u, v] = self.round_normal(line);
-        let length = u.hypot(v);
-        let [u, v] = [u / length, v / length];
+        let size = length([u, v]);
+        let [u, v] = [u / size, v / size];
         let near = self.distance(line) / self.disc.radius;
         let half = ((1.0 - near) * (1.0 + near)).sqrt();
         [[near * u + half * v, near * v - half * u], [near * u - half * v, near * v + half * u]]
@@ -156,7 +136,7 @@ impl Slice {
         let second = (y - across) / widths[1];
         let first = (x - along - lean * second) / widths[0];
         let is_corner =
-            first.hypot(second) <= radius + SLACK && FACES.iter().chain(&self.edges).all(is_inside);
+            length([first, second]) <= radius + SLACK && FACES.iter().chain(&self.edges).all(is_inside);
         is_corner.then(|| (second / radius).clamp(-1.0, 1.0).asin())
     }
 }
@@ -167,10 +147,8 @@ fn angle_of([x, y]: [f64; 2]) -> f64 {
 }
 
 /// The faces of the cell that rays stand on.
-const FACES: [Edge; 2] = [
-    Edge { normal: [-1.0, 0.0], offset: 0.0, flat: None },
-    Edge { normal: [1.0, 0.0], offset: 1.0, flat: None },
-];
+const FACES: [Edge; 2] =
+    [Edge { normal: [-1.0, 0.0], offset: 0.0 }, Edge { normal: [1.0, 0.0], offset: 1.0 }];
 
 /// Where two lines meet.
 fn meet(a: &Edge, b: &Edge) -> Option<[f64; 2]> {
@@ -181,4 +159,9 @@ fn meet(a: &Edge, b: &Edge) -> Option<[f64; 2]> {
         det([a.normal[0], a.offset], [b.normal[0], b.offset]) / area,
     ];
     point.iter().all(|x| x.is_finite()).then_some(point)
+}
+
+/// Lengths are those of a cell: `hypot` would take care of others.
+fn length([x, y]: [f64; 2]) -> f64 {
+    (x * x + y * y).sqrt()
 }

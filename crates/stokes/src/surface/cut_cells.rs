@@ -210,11 +210,10 @@ fn near<const D: usize>(
                 radius: ball.bounding_radius() / h,
             };
             let in_cell = flats.of(body).iter().map(|flat| flat.in_cell(&at, h, shear));
-            let flats: Vec<FlatInCell<D>> =
-                in_cell.filter(|flat| !flat.leaves_cell() && !flat.leaves_ball(&at)).collect();
+            let flats: Vec<FlatInCell<D>> = in_cell.filter(|flat| !flat.leaves(&at, shear)).collect();
             if farthest <= ball.bounding_radius() && flats.is_empty() {
                 covering = Some(body as u32);
-            } else if nearest < ball.bounding_radius() && !flats.iter().any(FlatInCell::takes_cell) {
+            } else if nearest < ball.bounding_radius() && !flats.iter().any(|flat| flat.takes(&at, shear)) {
                 cutting.push(Cutting { body: body as u32, ball: at, flats });
             }
         });
