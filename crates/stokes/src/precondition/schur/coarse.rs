@@ -8,11 +8,12 @@
 //! `z = T^-1 r + P (S_0^-1 - T_0^-1) P^T r`
 //!
 //! leaves all other pressures as they were. The bodies are left out: they change little on this scale, and
-//! without them the matrix stays the same from step to step.
+//! without them the matrix stays the same from step to step. In a box that is sheared it is that of a box with
+//! nearly the same shear, one of few.
 
 use std::sync::Arc;
 
-use gluey_fem::Interpolation;
+use gluey_fem::{Interpolation, TreeMesh};
 use gluey_linalg::{DirectError, LinOp, Ordering, Preconditioner, Subset, vector};
 use gluey_parallel::Halo;
 use nalgebra::{DMatrix, DVector};
@@ -28,6 +29,8 @@ use crate::space::Discretisation;
 const MOST_PRESSURES: usize = 1000;
 /// Least number of columns of `S_0` that one thread finds.
 const LEAST_COLUMNS: usize = 16;
+/// The matrix is that of a box whose shear is a multiple of this.
+const SHEARS: f64 = 0.125;
 /// Share of the mass that is added to `S_0`, for meshes so coarse that some pressure acts on no velocity.
 const SHARE_OF_MASS: f64 = 1e-3;
 
@@ -75,9 +78,18 @@ impl<const D: usize> CoarseSchur<D> {
         let mut missing = [if with_coarsest.is_none() { 1.0 } else { 0.0 }];
         halo.sum_over_ranks(&mut missing);
         let Some(all) = with_coarsest.filter(|_| missing[0] == 0.0) else { return Ok(None) };
-        let old = before.filter(|old| Arc::ptr_eq(&old.meshes[0].mesh, &all[0].mesh));
-        let old = old.and_then(|old| old.whole).filter(|old| old.viscosity == viscosity);
-        let whole = || old.map_or_else(|| CoarsestSchur::new(&all[0].alone(), viscosity), Ok);
+        let whole = || {
+            let mesh = TreeMesh::clone(&all[0].mesh);
+            let shear = (mesh.shear() / SHEARS).round() * SHEARS;
+            let mesh = mesh.sheared(shear);
+            let is_it = |old: &CoarsestSchur<D>| {
+                old.viscosity == viscosity && *old.system.discretisation().mesh == mesh
+            };
+            let old = before.and_then(|old| old.whole).filter(is_it);
+            let mut sheared = all[0].alone();
+            sheared.mesh = Arc::new(mesh);
+            old.map_or_else(|| CoarsestSchur::new(&sheared, viscosity), Ok)
+        };
         let whole = meshes[0].agreed(holds_all.then(whole).transpose())?;
         let transfers = all.windows(2).map(|pair| pair[0].interpolation(&pair[1], |mesh| &mesh.pressure));
         let halo = |mesh: &Discretisation<D>| {
@@ -218,7 +230,6 @@ fn dense_schur<const D: usize>(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use gluey_fem::TreeMesh;
     use gluey_geom::{Aabb, Vector};
 
     /// Meshes of a long box, from level 2 on, the finest with hanging nodes.
