@@ -109,6 +109,9 @@ impl<const D: usize> Region<D> {
             let mut of_cell = vec![0.0; node_count::<D>(2)];
             fluid.for_each_point(cell, &self.around, |point, arm, part| {
                 let part = part * weight(self.across(arm) / (self.reach * self.reach));
+                if part == 0.0 {
+                    return;
+                }
                 volume += part;
                 place += arm * part;
                 of_cell.iter_mut().zip(&point.shapes).for_each(|(sum, shape)| *sum += part * shape);
@@ -210,9 +213,13 @@ impl<const D: usize> FluidAround<'_, D> {
         let cell = cell as usize;
         let (lower, h) = (mesh.lower_corner(&mesh.cells()[cell]), discretisation.cell_size(cell));
         let shares = self.cut.cut(cell).map(|cut| &cut.moments.volume);
+        // The image that is nearest to the cell.
+        let center = around.arm(&(lower + Vector::repeat(0.5 * h)));
         for (q, point) in self.rule.0.iter().enumerate() {
             let share = shares.map_or(point.weight, |shares| shares[q]);
-            visit(point, &around.arm(&(lower + point.at * h)), share * h.powi(D as i32));
+            let mut beside = point.at.add_scalar(-0.5) * h;
+            beside[0] += mesh.shear() * beside[1];
+            visit(point, &(center + beside), share * h.powi(D as i32));
         }
     }
 
