@@ -1,13 +1,19 @@
 //! `cargo xtask bench-suspension`: the cost of a step of a sheared suspension, as one line of JSON.
 
 use std::num::NonZeroUsize;
+use std::path::PathBuf;
 
 use anyhow::Context;
-use gluey::{Case, CaseError, RunOptions, RunReport, Silent};
-use serde_json::{Map, json};
+use gluey::table::NumberTable;
+use gluey::{Case, CaseError, ResultPaths, RunOptions, RunReport, Silent};
+use serde_json::{Map, Value, json};
 
 /// Strain of a step.
 const STEP: f64 = 0.025;
+
+/// Tolerances of the linear solves: the default, and that of what errors are measured against.
+const USUAL: f64 = 1e-6;
+const REFERENCE: f64 = 1e-8;
 
 /// The suspension and the steps that are measured.
 #[derive(Clone, Debug, clap::Args)]
@@ -24,9 +30,9 @@ pub struct SuspensionBenchOptions {
     /// Cells in a radius, at least.
     #[arg(long, default_value_t = 2.0, value_name = "CELLS")]
     cells_per_radius: f64,
-    /// Cells along an edge on the coarsest mesh.
-    #[arg(long, default_value_t = 1, value_name = "N")]
-    root_cells: usize,
+    /// Cells along an edge on the coarsest mesh, in place of what a case without them gets.
+    #[arg(long, value_name = "N")]
+    root_cells: Option<usize>,
     /// Steps that are measured, after a first one.
     #[arg(long, default_value = "3", value_name = "N")]
     steps: NonZeroUsize,
@@ -36,24 +42,30 @@ pub struct SuspensionBenchOptions {
     /// Seed of the configuration.
     #[arg(long, default_value_t = 1)]
     seed: u64,
+    /// Compares viscosity and motions with those on a mesh with so many cells in a radius, solved to 1e-8.
+    #[arg(long, value_name = "CELLS", num_args = 0..=1, default_missing_value = "4.8")]
+    error: Option<f64>,
 }
 
 /// Measures, and prints the line. Seconds are wall time unless their name says CPU.
 pub fn run(options: &SuspensionBenchOptions) -> anyhow::Result<()> {
     let pool = rayon::ThreadPoolBuilder::new().num_threads(options.threads.get()).build();
     let pool = pool.context("no pool of threads")?;
-    let (first, one) = pool.install(|| timed_run(options, 1))?;
-    let (report, all) = pool.install(|| timed_run(options, 1 + options.steps.get()))?;
+    let Timed { report: first, cpu: one, motion } = pool.install(|| timed_run(options, 1, USUAL))?;
+    let Timed { report, cpu: all, .. } =
+        pool.install(|| timed_run(options, 1 + options.steps.get(), USUAL))?;
+    let memory = gluey::memory::peak();
+    let error = options.error.map(|cells| pool.install(|| errors(options, cells, &motion))).transpose()?;
     let steps = options.steps.get() as f64;
     let cpu = (all - one) / steps;
     let per_step = |name: &str| (seconds(&report, name) - seconds(&first, name)) / steps;
     let phases = report.phases.iter().map(|(name, _)| (name.clone(), per_step(name).into()));
-    let memory = gluey::memory::peak();
-    let measured = json!({
+    let mut measured = json!({
         "dimension": options.dimension,
         "particles": options.count,
         "volume_fraction": options.fraction,
         "cells": report.cells,
+        "cells_per_radius": report.cells_per_radius,
         "unknowns": report.dofs,
         "threads": options.threads,
         "steps": options.steps,
@@ -66,29 +78,102 @@ pub fn run(options: &SuspensionBenchOptions) -> anyhow::Result<()> {
         "peak_memory_bytes": memory,
         "peak_bytes_per_unknown": memory.map(|bytes| bytes / report.dofs.max(1) as u64),
         "steps_to_strain_1": 1.0 / STEP,
+        "sphere_steps_an_hour": 3600.0 * options.count as f64 / cpu,
+        "viscosity": motion.viscosity,
     });
+    if let (Some(error), Some(measured)) = (error, measured.as_object_mut()) {
+        measured.extend(error);
+    }
     println!("{measured}");
     Ok(())
 }
 
-/// A run of so many steps, and its CPU seconds.
-fn timed_run(options: &SuspensionBenchOptions, steps: usize) -> anyhow::Result<(RunReport, f64)> {
-    let case = case(options, steps).context("these options make no case")?;
-    let folder = tempfile::tempdir().context("no folder for the results")?;
-    let start = cpu_seconds();
-    let report = gluey::run(&case, &RunOptions::csv(folder.path().join("bench.csv")), &Silent)?;
-    Ok((report, cpu_seconds() - start))
+/// A run, its CPU seconds and its first step.
+struct Timed {
+    report: RunReport,
+    cpu: f64,
+    motion: FirstStep,
 }
 
-fn case(options: &SuspensionBenchOptions, steps: usize) -> Result<Case, CaseError> {
+/// The flow around the first configuration.
+struct FirstStep {
+    viscosity: f64,
+    /// Mean velocities in the first step beyond those of the undisturbed flow, one component after another.
+    velocities: Vec<f64>,
+    /// Spins beyond that of the undisturbed flow.
+    spins: Vec<f64>,
+}
+
+/// A run of so many steps.
+fn timed_run(options: &SuspensionBenchOptions, steps: usize, tolerance: f64) -> anyhow::Result<Timed> {
+    let case = case(options, steps, tolerance).context("these options make no case")?;
+    let folder = tempfile::tempdir().context("no folder for the results")?;
+    let csv = folder.path().join("bench.csv");
+    let start = cpu_seconds();
+    let report = gluey::run(&case, &RunOptions::csv(&csv), &Silent)?;
+    let cpu = cpu_seconds() - start;
+    let motion = FirstStep::read(&ResultPaths::of_csv(&csv), options)?;
+    Ok(Timed { report, cpu, motion })
+}
+
+/// What the first step differs by from that on a finer mesh: the viscosity over the finer one, velocities and
+/// spins as root mean squares over those of the finer ones.
+fn errors(
+    options: &SuspensionBenchOptions,
+    cells_per_radius: f64,
+    motion: &FirstStep,
+) -> anyhow::Result<Map<String, Value>> {
+    let fine = SuspensionBenchOptions { cells_per_radius, root_cells: None, ..options.clone() };
+    let Timed { report, motion: truth, .. } = timed_run(&fine, 1, REFERENCE)?;
+    let off = |found: &[f64], exact: &[f64]| {
+        let square = |x: f64| x * x;
+        let error: f64 = found.iter().zip(exact).map(|(a, b)| square(a - b)).sum();
+        (error / exact.iter().copied().map(square).sum::<f64>()).sqrt()
+    };
+    let errors = json!({
+        "viscosity_error": motion.viscosity / truth.viscosity - 1.0,
+        "velocity_error": off(&motion.velocities, &truth.velocities),
+        "spin_error": off(&motion.spins, &truth.spins),
+        "reference_cells_per_radius": report.cells_per_radius,
+        "reference_viscosity": truth.viscosity,
+    });
+    Ok(errors.as_object().cloned().unwrap_or_default())
+}
+
+impl FirstStep {
+    fn read(paths: &ResultPaths, options: &SuspensionBenchOptions) -> anyhow::Result<Self> {
+        let table = |path: PathBuf| -> anyhow::Result<NumberTable> {
+            Ok(NumberTable::parse(&std::fs::read_to_string(&path).context("no results")?)?)
+        };
+        let [trajectory, rheology] = [table(paths.csv())?, table(paths.rheology())?];
+        let (mut velocities, mut spins) = (Vec::new(), Vec::new());
+        for k in 1..=options.count {
+            for axis in ["x", "y", "z"].iter().take(options.dimension) {
+                let x = trajectory.column(&format!("{axis}{k}"))?;
+                let shear = if *axis == "x" { trajectory.column(&format!("y{k}"))?[0] - 0.5 } else { 0.0 };
+                velocities.push((x[1] - x[0]) / STEP - shear);
+            }
+            let axes: &[&str] = if options.dimension == 2 { &[""] } else { &["x", "y", "z"] };
+            for axis in axes {
+                let undisturbed = if matches!(*axis, "" | "z") { -0.5 } else { 0.0 };
+                spins.push(trajectory.column(&format!("omega{k}{axis}"))?[0] - undisturbed);
+            }
+        }
+        Ok(Self { viscosity: rheology.column("viscosity")?[0], velocities, spins })
+    }
+}
+
+fn case(options: &SuspensionBenchOptions, steps: usize, tolerance: f64) -> Result<Case, CaseError> {
     let SuspensionBenchOptions { count, fraction, dimension, cells_per_radius, root_cells, seed, .. } =
         options;
     let end = STEP * steps as f64;
+    let root_cells = root_cells.map_or_else(String::new, |count| format!("root_cells = {count}\n"));
     let text = format!(
         "name = \"bench\"\ndimension = {dimension}\n[domain]\nboundary = \"sheared\"\n\
          [suspension]\nvolume_fraction = {fraction:?}\ncount = {count}\nseed = {seed}\nmin_gap = 0.02\n\
          [time]\nstep = {STEP:?}\nend = {end:?}\n[contact]\nstrategy = \"none\"\n[flow]\nformulation = \"unfitted\"\n\
-         [flow.mesh]\ncells_per_radius = {cells_per_radius:?}\nroot_cells = {root_cells}\n"
+         tolerance = {tolerance:e}\n\
+         [flow.mesh]\ncells_per_radius = {cells_per_radius:?}\n{root_cells}"
     );
     Case::parse(&text, "bench-suspension")
 }
@@ -119,17 +204,18 @@ mod tests {
             fraction: 0.2,
             dimension,
             cells_per_radius: 2.0,
-            root_cells: 1,
+            root_cells: None,
             steps: NonZeroUsize::MIN,
             threads: NonZeroUsize::MIN,
             seed: 1,
+            error: None,
         }
     }
 
     #[test]
     fn a_case_has_the_steps_asked_for() {
         for dimension in [2, 3] {
-            let case = case(&options(10, dimension), 3).unwrap();
+            let case = case(&options(10, dimension), 3, USUAL).unwrap();
             assert_eq!(case.particles.len(), 10);
             assert!((case.time.end / case.time.step - 3.0).abs() < 1e-9);
         }
@@ -137,7 +223,7 @@ mod tests {
 
     #[test]
     fn options_that_make_no_case_are_told() {
-        let error = case(&options(10, 4), 1).unwrap_err().to_string();
+        let error = case(&options(10, 4), 1, USUAL).unwrap_err().to_string();
         assert!(error.contains("dimension"), "{error}");
     }
 }
