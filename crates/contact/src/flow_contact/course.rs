@@ -4,7 +4,7 @@
 //! slip in turn, and it may not end. Sweeps over the pairs do, at the price of a block for each two of them.
 
 use super::anderson::Anderson;
-use super::solve::{Coulomb, PairForce, State};
+use super::coulomb::{Coulomb, PairForce, State};
 use super::sweeps::Sweeps;
 
 /// Steps that the acceleration remembers.

@@ -7,13 +7,13 @@
 //!
 //! A step is an iteration. A flow with the forces of before gives motions; [`FlowContact::correct`] finds the
 //! forces with which the mobility keeps pairs apart; where these are others, a flow with them comes next.
-//! What the mobility lacks of the flow shrinks the change each time. From the third flow on Anderson's
-//! acceleration helps.
+//! What the mobility lacks of the flow shrinks the change each time, from the third flow on accelerated.
 //!
 //! Pairs may repel each other besides. The flow has the repulsion of the beginning of the step; what that of
 //! the step is beyond it acts in the mobility alone, and so do steps that are as long as they like.
 
 mod anderson;
+mod coulomb;
 mod course;
 mod near;
 mod pair_repulsion;
@@ -36,8 +36,9 @@ use crate::{
     StandingGap, StepGeometry, TwistMobility,
 };
 use anderson::Anderson;
+use coulomb::PairForce;
 use near::{KnownForce, NearPairs};
-use solve::{Outcome, PairForce};
+use solve::Outcome;
 use touch::{Touch, mean_radius};
 
 pub use params::{FlowContactParams, Friction, NormalLaw};
@@ -241,9 +242,8 @@ impl<const D: usize> FlowContact<D> {
 
     /// The force by which a pair repelled each other in the last step.
     fn repelled(&self, pair: PairKey) -> f64 {
-        let [before, _] = &self.repelled;
-        let place = before.binary_search_by_key(&pair, |(pair, _)| *pair);
-        place.map_or(0.0, |k| before[k].1)
+        let place = self.repelled[0].binary_search_by_key(&pair, |(pair, _)| *pair);
+        place.map_or(0.0, |k| self.repelled[0][k].1)
     }
 
     /// The candidates of the search and the pairs with known forces, sorted.

@@ -2,8 +2,9 @@
 
 use gluey_geom::Twist;
 
+use super::coulomb::{Coulomb, PairForce, resolution};
 use super::params::FlowContactParams;
-use super::solve::{Coulomb, Outcome, PairForce, resolution};
+use super::solve::{Outcome, solve};
 use super::touch::Touch;
 use crate::{BodyStep, ContactError, PairKey, TwistMobility};
 
@@ -63,7 +64,7 @@ impl<const D: usize> NearPairs<D> {
             let mut forces: Vec<PairForce<D>> = chosen.iter().map(|&k| self.forces[k]).collect();
             let mobility = &mut *mobility;
             let mut problem = Coulomb { step, touches: &touches, params, rate, mobility, free };
-            let outcome = problem.solve(&mut forces);
+            let outcome = solve(&mut problem, &mut forces);
             let outcome = outcome.map_err(|stalled| ContactError::NotConverged {
                 residual: stalled.residual,
                 tolerance: params.tolerance,

@@ -3,7 +3,7 @@
 
 use gluey_geom::{Matrix, Vector};
 
-use super::solve::{Coulomb, PairForce, PairMotion};
+use super::coulomb::{Coulomb, PairForce, PairMotion};
 
 /// Sweeps between two looks at what the forces really do.
 const SWEEPS: usize = 20;

@@ -4,7 +4,7 @@ use std::f64::consts::PI;
 
 use gluey_geom::{Dim, Pose, Spin, Twist, Vector};
 
-use super::solve::{Coulomb, PairForce};
+use super::coulomb::{Coulomb, PairForce};
 use super::sweeps::Sweeps;
 use super::touch::Touch;
 use super::{FlowContact, FlowContactParams, Friction, NormalLaw};
@@ -227,8 +227,8 @@ fn repulsion_and_contact_share_a_push() {
     }
 }
 
-/// Eight spheres at the corners of a cube that a flow presses together and shears: sweeps from nothing end, at
-/// the motions of the accelerated iteration.
+/// Eight spheres at the corners of a cube that a flow presses together and shears: sweeps from nothing end,
+/// at the motions of the accelerated iteration.
 #[test]
 fn sweeps_find_the_forces_of_the_acceleration() {
     let place = |k: usize| Vector::<3>::from_fn(|d, _| 2.01 * (k >> d & 1) as f64);

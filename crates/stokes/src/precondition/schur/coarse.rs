@@ -8,8 +8,8 @@
 //! `z = T^-1 r + P (S_0^-1 - T_0^-1) P^T r`
 //!
 //! leaves all other pressures as they were. The bodies are left out: they change little on this scale, and
-//! without them the matrix stays the same from step to step. In a box that is sheared it is that of a box with
-//! nearly the same shear, one of few.
+//! without them the matrix stays the same from step to step. In a box that is sheared it is that of a box
+//! with nearly the same shear, one of few.
 
 use std::sync::Arc;
 
