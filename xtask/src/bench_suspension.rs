@@ -226,4 +226,17 @@ mod tests {
         let error = case(&options(10, 4), 1, USUAL).unwrap_err().to_string();
         assert!(error.contains("dimension"), "{error}");
     }
+
+    /// None on the same mesh but for the tolerance, some per cent on one with twice the cells in a radius.
+    #[test]
+    fn errors_are_those_of_the_mesh() {
+        let options = options(10, 2);
+        let motion = timed_run(&options, 1, USUAL).unwrap().motion;
+        let error =
+            |cells: f64, of: &str| errors(&options, cells, &motion).unwrap()[of].as_f64().unwrap().abs();
+        for (of, least) in [("viscosity_error", 1e-4), ("velocity_error", 1e-3), ("spin_error", 1e-3)] {
+            let [same, finer] = [2.0, 4.0].map(|cells| error(cells, of));
+            assert!(same < 1e-5 && least < finer && finer < 0.2, "{of}: {same}, {finer}");
+        }
+    }
 }
