@@ -125,7 +125,7 @@ fn line_of_discs(end: f64) -> Case {
     let discs: Vec<String> = (0..6).map(disc).collect();
     case(&format!(
         "name = \"r\"\ndimension = 2\nparticles = [{}]\ndomain = {{ boundary = \"periodic\" }}\n\
-         time = {{ step = 0.05, end = {end} }}\ncontact = {{ strategy = \"gluey\" }}\n\
+         time = {{ step = 0.03, end = {end} }}\ncontact = {{ strategy = \"gluey\" }}\n\
          [flow]\nlubrication = \"none\"\nsolver = \"multigrid\"\ntolerance = 1e-10\n\
          [flow.mesh]\ncells_per_radius = 3.2\ncoarsest_level = 2\nband = 3\n",
         discs.join(", ")
@@ -138,7 +138,7 @@ fn with_a_fault(fault: (usize, usize)) -> Vec<(Result<(), String>, usize)> {
     let folder = TempDir::new().expect("a folder");
     let vtk = VtkOptions::new(folder.path().join("vtk"), 1);
     let options = RunOptions { vtk: Some(vtk), ..with_checkpoints(folder.path()) };
-    let case = line_of_discs(0.1);
+    let case = line_of_discs(0.06);
     let done = Threads::run(3, |ranks| {
         let ranks = Failing::new(ranks, fault.0, fault.1);
         let agreements = ranks.agreements();
@@ -173,7 +173,7 @@ fn a_rank_that_fails_anywhere_in_a_run_ends_all() {
 /// One rank is asked to stop: all do after the same step.
 #[test]
 fn all_stop_when_one_is_asked_to() {
-    let (folder, case) = (TempDir::new().expect("a folder"), line_of_discs(0.15));
+    let (folder, case) = (TempDir::new().expect("a folder"), line_of_discs(0.09));
     let ends = Threads::run(3, |ranks| {
         let interrupt = Some(Arc::new(AtomicBool::new(ranks.rank() == 1)));
         let options = RunOptions { interrupt, ..with_checkpoints(folder.path()) };
@@ -196,7 +196,7 @@ impl Progress for Faulty {
 /// A rank that panics ends the others, who wait for it, and its run is known to have failed.
 #[test]
 fn a_rank_that_panics_ends_all() {
-    let (folder, case) = (TempDir::new().expect("a folder"), line_of_discs(0.1));
+    let (folder, case) = (TempDir::new().expect("a folder"), line_of_discs(0.06));
     let record = Some(RecordOptions::default());
     let options = RunOptions { record, ..RunOptions::csv(folder.path().join("t.csv")) };
     let paths = ResultPaths::of_csv(&options.csv);
@@ -236,7 +236,7 @@ fn at_a_given_stress_the_rate_is_the_same() {
 #[test]
 fn contacts_are_shared_too() {
     let until = line_of_discs;
-    let long = until(0.15);
+    let long = until(0.09);
     ranks_are_as_one_process("contacts", &long, &[""], 1.3e-7);
     let [whole, again, stopped] = [(); 3].map(|()| TempDir::new().expect("a folder"));
     for folder in [&whole, &again] {
@@ -246,7 +246,7 @@ fn contacts_are_shared_too() {
     assert_eq!(rows(whole.path()), rows(again.path()), "the same bits");
     let pairs = column(&whole.path().join("t-solver.csv"), "contact_pairs");
     assert!(pairs.iter().copied().fold(0.0, f64::max) >= 4.0, "{pairs:?}");
-    assert!(run_on(3, &until(0.1), &with_checkpoints(stopped.path())).iter().all(Result::is_ok));
+    assert!(run_on(3, &until(0.06), &with_checkpoints(stopped.path())).iter().all(Result::is_ok));
     for size in [3, 2, 1] {
         let folder = copy_of(stopped.path());
         let options = with_checkpoints(folder.path());
