@@ -1,9 +1,10 @@
 //! The iteration for the forces between pairs.
 
+use gluey_geom::{Twist, Vector};
+
 use super::coulomb::{Coulomb, PairForce, norm};
 use super::course::Course;
 use crate::solver::ResidualHistory;
-use gluey_geom::{Twist, Vector};
 
 /// Outcome of the iteration.
 pub(super) struct Outcome<const D: usize> {

@@ -217,13 +217,13 @@ fn repulsion_and_contact_share_a_push() {
             // The first step has no history: the force is that of its end.
             let moved = twists[1].velocity.x - encounter.twists[1].velocity.x;
             let found = moved * 6.0 * PI * RADII[1] + law.at::<3>(0.05, RADII);
-            assert!((found / law.at::<3>(gap, RADII) - 1.0).abs() < 1e-3, "{found} {gap}");
+            assert!((found / law.at::<3>(gap, RADII) - 1.0).abs() < 1e-9, "{found} {gap}");
             continue;
         };
         assert!(!is_enough && (measured - 0.015).abs() < 1e-12 && (gap - 0.015).abs() < 1e-12, "{gap}");
-        // The flow alone would close the gap.
+        // The flow alone would close the gap. The pair turns while it moves, which takes a part of the push.
         let excess = law.at::<3>(0.015, RADII) - law.at::<3>(0.05, RADII);
-        assert!((force.norm() + excess - 0.3 * push).abs() < 0.03 * push, "{force} {excess} {push}");
+        assert!((force.norm() + excess - 0.3 * push).abs() < 0.02 * push, "{force} {excess} {push}");
     }
 }
 
