@@ -7,6 +7,7 @@ use super::coarse::CoarseSolver;
 use super::hierarchy::Hierarchy;
 use super::level::{Level, Smoothing};
 use crate::error::StokesError;
+use crate::film::FilmCorrection;
 use crate::precondition::Correction;
 use crate::space::{VelocitySpace, norm};
 
@@ -14,6 +15,8 @@ use crate::space::{VelocitySpace, norm};
 pub struct LevelPlan<const D: usize> {
     /// Velocities with the bodies' nodes eliminated.
     pub space: VelocitySpace<D>,
+    /// Its viscosity.
+    pub viscosity: f64,
     /// How it smooths, if it does.
     pub smoothing: Option<Smoothing>,
 }
@@ -33,8 +36,7 @@ pub struct VCycle<const D: usize> {
 }
 
 impl<const D: usize> VCycle<D> {
-    /// The cycle on the meshes of `hierarchy`, a plan for each, in a fluid of this viscosity. All ranks call
-    /// this.
+    /// The cycle on the meshes of `hierarchy`, a plan for each. All ranks call this.
     ///
     /// # Errors
     /// If a diagonal or the matrix of the coarsest level has no inverse, on all ranks.
@@ -42,13 +44,13 @@ impl<const D: usize> VCycle<D> {
         hierarchy: Hierarchy<D>,
         plans: Vec<LevelPlan<D>>,
         correction: Option<Box<dyn Correction>>,
-        viscosity: f64,
     ) -> Result<Self, StokesError> {
         let level = |(level, plan): (usize, LevelPlan<D>)| {
             let mesh = plan.space.discretisation().clone();
-            let made = Level::new(plan.space, viscosity, plan.smoothing);
+            let made = Level::new(plan.space, plan.viscosity, plan.smoothing);
             mesh.agreed(made.map_err(|source| StokesError::Smoother { level, source }))
         };
+        let viscosity = plans[0].viscosity;
         let levels = plans.into_iter().enumerate().map(level).collect::<Result<Vec<_>, _>>()?;
         let coarse = levels[0].space.whole().map(|space| CoarseSolver::new(space, viscosity));
         let coarse = levels[0].space.discretisation().agreed(coarse.transpose())?;
@@ -99,25 +101,30 @@ impl<const D: usize> VCycle<D> {
         vector::convert(norm, &self.levels[top].x, z);
     }
 
-    /// The reduced velocities `u` of one cycle on the finest rigid level for the nodal load `f`, which is
-    /// reduced in place.
-    fn rigid_velocities(&mut self, f: &mut [f64], u: &mut [f32]) {
+    /// See [`Correction::apply`].
+    fn rigid_velocities(&mut self, f: &mut [f64], u: &mut [f32], films: Option<&mut FilmCorrection<'_>>) {
         let top = self.levels.len() - 1;
         let Level { space, halo, .. } = &mut self.levels[top];
+        let nodal = space.full_dim();
         halo.clear(f);
         space.reduce(f);
         halo.sum(f);
         self.rigid_cycle(f, u);
+        match films {
+            Some(films) => films.resist(&mut u[nodal..], &mut f[nodal..]),
+            None => f[nodal..].fill(0.0),
+        }
     }
 
     /// `z = V (r - g)` for the gradient `g` that `gradient` writes, in vectors with this halo that are zero
-    /// at ghosts.
+    /// at ghosts, with `films` between the bodies.
     pub fn answer<S: Scalar>(
         &mut self,
         r: &[S],
         gradient: impl FnOnce(&mut [f32]),
         z: &mut [S],
         halo: &mut Halo,
+        mut films: Option<&mut FilmCorrection<'_>>,
     ) {
         let top = self.levels.len() - 1;
         gradient(&mut self.levels[top].b[..r.len()]);
@@ -132,7 +139,9 @@ impl<const D: usize> VCycle<D> {
         halo.accumulate(&mut load);
         vector::residual_from_product(r, &mut load);
         halo.update(&mut load);
-        correction.apply(&load, &mut answer, &mut |f, u| self.rigid_velocities(f, u));
+        correction.apply(&load, &mut answer, &mut |f, u| {
+            self.rigid_velocities(f, u, films.as_deref_mut());
+        });
         halo.clear(&mut answer);
         vector::convert(1.0, &answer, z);
         self.wide = [load, answer];
@@ -143,7 +152,7 @@ impl<const D: usize> VCycle<D> {
 impl<const D: usize> Preconditioner<f64> for VCycle<D> {
     fn apply(&mut self, r: &[f64], z: &mut [f64]) {
         let Some(mut correction) = self.correction.take() else { return self.rigid_cycle(r, z) };
-        correction.apply(r, z, &mut |f, u| self.rigid_velocities(f, u));
+        correction.apply(r, z, &mut |f, u| self.rigid_velocities(f, u, None));
         self.correction = Some(correction);
     }
 }
