@@ -43,7 +43,6 @@ pub mod statistics;
 pub mod structure;
 
 pub use container::Container;
-pub use gluey_geom::ball_volume;
 pub use pairs::{NearPair, for_each_pair};
 pub use repulsion::{Repelled, repelled};
 
