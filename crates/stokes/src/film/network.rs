@@ -95,8 +95,6 @@ pub struct FilmNetwork {
     rigid: usize,
     /// Bodies whose twists are data.
     held: Vec<bool>,
-    /// `A_b`, row by row.
-    twist_blocks: Vec<f64>,
     /// The rows whose forces are here.
     rows: Vec<FilmRow>,
     factor: DirectSpd,
@@ -157,8 +155,7 @@ impl FilmNetwork {
         let symbolic = Symbolic::new(matrix.pattern().clone(), Ordering::Amd)?;
         let mut factor = DirectSpd::new(Arc::new(symbolic), RefinementParams::default())?;
         factor.factorise(matrix.values())?;
-        let (held, twist_blocks) = (held.to_vec(), twist_blocks.to_vec());
-        Ok(Some(Self { rigid, held, twist_blocks, rows: own, factor, shared: None }))
+        Ok(Some(Self { rigid, held: held.to_vec(), rows: own, factor, shared: None }))
     }
 
     /// The same for vectors with the twists of some of the bodies.
@@ -194,13 +191,6 @@ impl FilmNetwork {
         Ok(motions)
     }
 
-    /// `A_b` times a twist of a body.
-    fn block_times(&self, body: usize, twist: &[f64]) -> impl Iterator<Item = f64> {
-        let size = self.rigid * self.rigid;
-        let rows = self.twist_blocks[body * size..][..size].chunks_exact(self.rigid);
-        rows.map(move |row| row.iter().zip(twist).map(|(a, v)| a * v).sum())
-    }
-
     fn clear_held(&self, load: &mut [f64]) {
         let bodies = load.chunks_exact_mut(self.rigid).zip(&self.held);
         bodies.filter(|(_, held)| **held).for_each(|(load, _)| load.fill(0.0));
@@ -223,55 +213,28 @@ impl FilmCorrection<'_> {
     /// Changes the twists of all bodies and the forces `g` of own films so that `s B V - g = b` holds in the
     /// rows of motion. All ranks call this.
     pub fn apply<S: Scalar>(&mut self, b: &[S], twists: &mut [S], g: &mut [S]) {
-        self.set_change(twists, |row| b[row].to_f64() + g[row].to_f64());
-        let Self { network, residuals, twists: change, .. } = self;
-        let rigid = network.rigid;
-        match &network.shared {
-            None => add(twists, change),
-            Some(shared) => shared.own(rigid).for_each(|[here, at]| add(&mut twists[here], &change[at])),
+        let network = self.network;
+        let Some(shared) = &network.shared else { return self.correct(b, twists, g) };
+        let mut all = std::mem::take(&mut self.all);
+        all.fill(0.0);
+        for [here, at] in shared.own(network.rigid) {
+            vector::convert(1.0, &twists[here], &mut all[at]);
         }
-        for (row, residual) in network.rows.iter().zip(&*residuals) {
-            let at = row.row as usize;
-            g[at] = S::from_f64(g[at].to_f64() + row.motion(rigid, change) - residual);
+        shared.halo.sum_over_ranks(&mut all);
+        self.correct(b, &mut all, g);
+        for [here, at] in shared.own(network.rigid) {
+            vector::convert(1.0, &all[at], &mut twists[here]);
         }
+        self.all = all;
     }
 
-    /// Lets films without other forces resist to twists: changes those that are here, as
-    /// [`FilmCorrection::apply`] does, and writes what the films exert on their bodies then to `loads`, with
-    /// the opposite sign, `s^2 B^T B V`. That is `-A_b` times the change. Twists are the same at ghosts as at
-    /// their owners. All ranks call this.
-    pub fn resist(&mut self, twists: &mut [f32], loads: &mut [f64]) {
-        self.set_change(twists, |_| 0.0);
-        let Self { network, twists: change, .. } = self;
+    fn correct<S: Scalar, T: Scalar>(&mut self, b: &[S], twists: &mut [T], g: &mut [S]) {
+        let Self { network, factor, residuals, load, twists: change, .. } = self;
         let rigid = network.rigid;
-        for place in 0..twists.len() / rigid {
-            let body = network.shared.as_ref().map_or(place, |shared| shared.bodies[place] as usize);
-            let change = &change[body * rigid..][..rigid];
-            add(&mut twists[place * rigid..][..rigid], change);
-            let products = network.block_times(body, change);
-            loads[place * rigid..].iter_mut().zip(products).for_each(|(load, product)| *load = -product);
-        }
-    }
-
-    /// The residuals of the rows of motion where `given` is `b + g`, and the change of the twists of all
-    /// bodies by which they vanish.
-    fn set_change<T: Scalar>(&mut self, twists: &[T], given: impl Fn(usize) -> f64) {
-        let Self { network, factor, residuals, load, twists: change, all } = self;
-        let rigid = network.rigid;
-        let motion = |row: &FilmRow, all: &[f64]| match &network.shared {
-            None => row.motion(rigid, twists),
-            Some(_) => row.motion(rigid, all),
-        };
-        if let Some(shared) = &network.shared {
-            all.fill(0.0);
-            for [here, at] in shared.own(rigid) {
-                vector::convert(1.0, &twists[here], &mut all[at]);
-            }
-            shared.halo.sum_over_ranks(all);
-        }
         load.fill(0.0);
         for (row, residual) in network.rows.iter().zip(&mut *residuals) {
-            *residual = given(row.row as usize) - motion(row, all);
+            let at = row.row as usize;
+            *residual = b[at].to_f64() - row.motion(rigid, twists) + g[at].to_f64();
             row.entries(rigid).for_each(|(k, weight)| load[k] += weight * *residual);
         }
         if let Some(shared) = &network.shared {
@@ -279,9 +242,11 @@ impl FilmCorrection<'_> {
         }
         network.clear_held(load);
         factor.apply(load, change);
+        let sums = twists.iter_mut().zip(&*change);
+        sums.for_each(|(twist, change)| *twist = T::from_f64(twist.to_f64() + change));
+        for (row, residual) in network.rows.iter().zip(&*residuals) {
+            let at = row.row as usize;
+            g[at] = S::from_f64(g[at].to_f64() + row.motion(rigid, change) - residual);
+        }
     }
-}
-
-fn add<T: Scalar>(twists: &mut [T], change: &[f64]) {
-    twists.iter_mut().zip(change).for_each(|(twist, change)| *twist = T::from_f64(twist.to_f64() + change));
 }

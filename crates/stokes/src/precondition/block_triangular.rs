@@ -72,10 +72,7 @@ impl<S: Scalar, const D: usize> Preconditioner<S> for BlockTriangular<'_, D> {
         vector::copy(answer, pressure);
         of_pressures.update(pressure);
         system.pressure.expand(pressure);
-        let gradient = |load: &mut [f32]| forces.set(system, pressure, zf, load);
-        // In 2D it does not pay: discs that touch take up to 34 iterations with it, 27 without.
-        let of_levels = correction.as_mut().filter(|_| D == 3);
-        cycle.answer(ru, gradient, zu, of_velocities, of_levels);
+        cycle.answer(ru, |load| forces.set(system, pressure, zf, load), zu, of_velocities);
         system.space.clear_held(zu);
         if let Some(correction) = correction {
             correction.apply(rf, &mut zu[system.space.full_dim()..], zf);

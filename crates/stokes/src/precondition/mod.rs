@@ -23,8 +23,7 @@ pub struct CycleLevels<'a, const D: usize> {
 /// A correction around the velocity cycle, for the errors that its levels do not reduce.
 pub trait Correction: Send {
     /// `z = M^-1 r` for reduced velocities, where `levels(f, u)` turns the nodal load `f` into the reduced
-    /// velocities `u` of the finest level, and its part of the twists into the loads with which films resist
-    /// to these.
+    /// velocities `u` of the finest level.
     fn apply(&mut self, r: &[f64], z: &mut [f64], levels: &mut dyn FnMut(&mut [f64], &mut [f32]));
 
     /// Applications of operators since the last call, each as its share of the mesh. Solves with factors and

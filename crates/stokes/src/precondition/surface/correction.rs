@@ -5,9 +5,6 @@
 //! smoother, the levels `V` and Chebyshev's sweep `C`:
 //!
 //! `z = G r`, `z += V (r - A z)`, `z += G (r - A z)`, `z += C (r - A z)`.
-//!
-//! Films resist to the motions of `V`: these change, and what films exert then is taken out of the residual,
-//! so that the smoothers find how the fluid follows.
 
 use gluey_linalg::vector;
 use gluey_parallel::Halo;
@@ -86,7 +83,6 @@ impl<const D: usize> SurfaceCorrection<D> {
         self.smoother.update(&mut self.correction);
         vector::axpy(1.0, &self.correction, &mut self.x);
         self.smoother.subtract(&self.correction, &mut self.r);
-        vector::axpy(-1.0, &self.load[nodal..], &mut self.r[nodal..]);
     }
 }
 

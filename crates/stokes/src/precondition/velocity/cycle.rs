@@ -7,7 +7,6 @@ use super::coarse::CoarseSolver;
 use super::hierarchy::Hierarchy;
 use super::level::{Level, Smoothing};
 use crate::error::StokesError;
-use crate::film::FilmCorrection;
 use crate::precondition::Correction;
 use crate::space::{VelocitySpace, norm};
 
@@ -101,30 +100,25 @@ impl<const D: usize> VCycle<D> {
         vector::convert(norm, &self.levels[top].x, z);
     }
 
-    /// See [`Correction::apply`].
-    fn rigid_velocities(&mut self, f: &mut [f64], u: &mut [f32], films: Option<&mut FilmCorrection<'_>>) {
+    /// The reduced velocities `u` of one cycle on the finest rigid level for the nodal load `f`, which is
+    /// reduced in place.
+    fn rigid_velocities(&mut self, f: &mut [f64], u: &mut [f32]) {
         let top = self.levels.len() - 1;
         let Level { space, halo, .. } = &mut self.levels[top];
-        let nodal = space.full_dim();
         halo.clear(f);
         space.reduce(f);
         halo.sum(f);
         self.rigid_cycle(f, u);
-        match films {
-            Some(films) => films.resist(&mut u[nodal..], &mut f[nodal..]),
-            None => f[nodal..].fill(0.0),
-        }
     }
 
     /// `z = V (r - g)` for the gradient `g` that `gradient` writes, in vectors with this halo that are zero
-    /// at ghosts, with `films` between the bodies.
+    /// at ghosts.
     pub fn answer<S: Scalar>(
         &mut self,
         r: &[S],
         gradient: impl FnOnce(&mut [f32]),
         z: &mut [S],
         halo: &mut Halo,
-        mut films: Option<&mut FilmCorrection<'_>>,
     ) {
         let top = self.levels.len() - 1;
         gradient(&mut self.levels[top].b[..r.len()]);
@@ -139,9 +133,7 @@ impl<const D: usize> VCycle<D> {
         halo.accumulate(&mut load);
         vector::residual_from_product(r, &mut load);
         halo.update(&mut load);
-        correction.apply(&load, &mut answer, &mut |f, u| {
-            self.rigid_velocities(f, u, films.as_deref_mut());
-        });
+        correction.apply(&load, &mut answer, &mut |f, u| self.rigid_velocities(f, u));
         halo.clear(&mut answer);
         vector::convert(1.0, &answer, z);
         self.wide = [load, answer];
@@ -152,7 +144,7 @@ impl<const D: usize> VCycle<D> {
 impl<const D: usize> Preconditioner<f64> for VCycle<D> {
     fn apply(&mut self, r: &[f64], z: &mut [f64]) {
         let Some(mut correction) = self.correction.take() else { return self.rigid_cycle(r, z) };
-        correction.apply(r, z, &mut |f, u| self.rigid_velocities(f, u, None));
+        correction.apply(r, z, &mut |f, u| self.rigid_velocities(f, u));
         self.correction = Some(correction);
     }
 }
