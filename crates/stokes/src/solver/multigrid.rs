@@ -21,7 +21,8 @@ use crate::precondition::velocity::{Hierarchy, LevelPlan, VCycle, relative_visco
 use crate::precondition::{BlockTriangular, CycleLevels};
 use crate::space::{Discretisation, VelocitySpace, solid_nodes};
 
-/// Iterations between restarts: a restart forgets the few modes that hold a crowd up. Most solves end before 60.
+/// Iterations between restarts: a restart forgets the few modes that hold a crowd up. Most solves end before
+/// 60.
 const RESTART: usize = 150;
 /// Largest [`rounding_noise`] with which steps are taken in single precision. A few times more costs many
 /// iterations, see `docs/archive/experiments/0010-krylov-vectors.md`.

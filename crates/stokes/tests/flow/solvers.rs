@@ -111,8 +111,8 @@ fn iterations_do_not_grow_with_resolution_or_the_number_of_spheres() {
     assert!(flow.iteration_count <= 29, "{}", flow.iteration_count);
 }
 
-/// A crowd at a fraction of 0.27 with films as thick as a cell between all neighbours: 66 iterations on levels
-/// of the fluid's viscosity.
+/// A crowd at a fraction of 0.27 with films as thick as a cell between all neighbours: 66 iterations on
+/// levels of the fluid's viscosity.
 #[test]
 fn iterations_are_bounded_in_a_crowd() {
     let center = |k: usize| {

@@ -9,9 +9,9 @@ use gluey_levelset::{Ball, Body};
 
 use crate::space::Discretisation;
 
-/// Logarithm of the viscosity of a level over the fraction of its volume that bodies are. Suspensions have 2.7
-/// at 0.1 to 4.3 at 0.45 (Krieger and Dougherty 1959, `(1 - fraction / 0.64)^-1.6`); with more than 3 motions
-/// of single cells, which the levels correct too, take longer.
+/// Logarithm of the viscosity of a level over the fraction of its volume that bodies are. Suspensions have
+/// 2.7 at 0.1 to 4.3 at 0.45 (Krieger and Dougherty 1959, `(1 - fraction / 0.64)^-1.6`); with more than 3
+/// motions of single cells, which the levels correct too, take longer.
 const PER_FRACTION: f64 = 3.0;
 /// Radii in cells: from the first on a level resolves a body, below the second not at all.
 const RESOLVED: [f64; 2] = [1.7, 0.6];
