@@ -21,7 +21,7 @@ pub use aabb::Aabb;
 pub use algebra::{Matrix, Vector};
 pub use lattice::Lattice;
 pub use motion::{Particle, Pose, Twist, Wrench};
-pub use space::{Dim, Rotation, Spin, ball_volume};
+pub use space::{Dim, Rotation, Spin};
 
 /// The examples of the README.
 #[cfg(doctest)]

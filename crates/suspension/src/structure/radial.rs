@@ -2,8 +2,7 @@
 
 use gluey_geom::Vector;
 
-use crate::{Container, for_each_pair};
-use gluey_geom::ball_volume;
+use crate::{Container, ball_volume, for_each_pair};
 
 /// A bin of distances.
 #[derive(Clone, Copy, Debug, PartialEq)]
