@@ -12,7 +12,11 @@ use gluey_stokes::{
 
 use crate::support::{is_in_fluid, on_ranks, velocities};
 
-const TOLERANCE: f64 = 1e-11;
+/// Ten times less than what ranks may differ by: the weights of the pressures of a part lack what distant cells
+/// add at hanging nodes, so that its iterates are others, each as good.
+const TOLERANCE: f64 = 1e-12;
+/// What ranks may differ by in 2D, with hanging nodes.
+const LIMIT: f64 = 1e-11;
 /// What one rank may differ from one process by: only pressures lose their mean, of which wrenches are
 /// sums.
 const ALONE: f64 = 1.4e-15;
@@ -207,21 +211,21 @@ fn fifty(levels: [u8; 2], lubrication: Lubrication) -> Example<3> {
 
 #[test]
 fn bodies_apart_move_as_in_the_serial_solver() {
-    three::<2>(0.5, [4, 5], Lubrication::None).check(&[1, 2, 3, 4, 8], TOLERANCE);
+    three::<2>(0.5, [4, 5], Lubrication::None).check(&[1, 2, 3, 4, 8], LIMIT);
     three::<3>(0.5, [3, 4], Lubrication::None).check(&[1, 2, 3, 8], 1e-12);
 }
 
 #[test]
 fn films_are_those_of_the_serial_solver() {
     for gap in [0.3, 0.02, 1e-4] {
-        three::<2>(gap, [4, 5], Lubrication::Deficit).check(&[1, 2, 3, 4, 8], TOLERANCE);
+        three::<2>(gap, [4, 5], Lubrication::Deficit).check(&[1, 2, 3, 4, 8], LIMIT);
         three::<3>(gap, [3, 4], Lubrication::Deficit).check(&[1, 2, 3, 8], 8e-13);
     }
 }
 
 #[test]
 fn fifty_spheres_move_as_in_the_serial_solver() {
-    fifty([3, 4], Lubrication::Deficit).check(&[3], TOLERANCE);
+    fifty([3, 4], Lubrication::Deficit).check(&[3], LIMIT);
 }
 
 /// A force on the fluid, a body that is driven, and one in a box without walls where nothing flows on the
@@ -230,7 +234,7 @@ fn fifty_spheres_move_as_in_the_serial_solver() {
 fn forces_on_the_fluid_and_given_motions_are_those_of_the_serial_solver() {
     for drive in [Drive::Force, Drive::Motion, Drive::MotionWithoutMean] {
         let flat = three::<2>(0.1, [4, 5], Lubrication::Deficit);
-        Example { drive, ..flat }.check(&[1, 2, 5], TOLERANCE);
+        Example { drive, ..flat }.check(&[1, 2, 5], LIMIT);
         let solid = three::<3>(0.1, [3, 4], Lubrication::Deficit);
         Example { drive, ..solid }.check(&[1, 3], 1e-12);
     }

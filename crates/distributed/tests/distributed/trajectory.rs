@@ -40,7 +40,7 @@ const TRIO: Meeting = Meeting {
     radius: 0.05,
     surface: 7,
     tolerance: 1e-11,
-    slack: 3,
+    slack: 6,
 };
 
 fn suspension<const D: usize>(

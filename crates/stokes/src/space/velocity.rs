@@ -157,12 +157,28 @@ impl<const D: usize> VelocitySpace<D> {
         if self.halos[0].is_empty() {
             return;
         }
-        let (mut halo, mut numbers) = (self.halos[0].clone(), vec![0f32; self.dim()]);
-        let first = numbers.chunks_exact_mut(D).zip(marks.iter());
-        first.for_each(|(numbers, &is_marked)| numbers[0] = f32::from(u8::from(is_marked)));
+        let (mut halo, mut numbers) = (self.halos[0].clone(), self.numbers(marks));
         halo.clear(&mut numbers);
         halo.update(&mut numbers);
         marks.iter_mut().zip(numbers.chunks_exact(D)).for_each(|(mark, numbers)| *mark = numbers[0] > 0.0);
+    }
+
+    /// Marks the free nodes that any rank has marked: nothing on one rank.
+    pub fn join_marks(&self, marks: &mut [bool]) {
+        if self.halos[0].is_empty() {
+            return;
+        }
+        let (mut halo, mut numbers) = (self.halos[0].clone(), self.numbers(marks));
+        halo.sum(&mut numbers);
+        marks.iter_mut().zip(numbers.chunks_exact(D)).for_each(|(mark, numbers)| *mark |= numbers[0] > 0.0);
+    }
+
+    /// Reduced velocities whose first component is one at marked nodes.
+    fn numbers(&self, marks: &[bool]) -> Vec<f32> {
+        let mut numbers = vec![0f32; self.dim()];
+        let first = numbers.chunks_exact_mut(D).zip(marks);
+        first.for_each(|(numbers, &is_marked)| numbers[0] = f32::from(u8::from(is_marked)));
+        numbers
     }
 
     /// Whether anything fixes a constant velocity: a wall, or bodies that are held.

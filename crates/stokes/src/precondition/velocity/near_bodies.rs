@@ -58,6 +58,8 @@ impl<const D: usize> NearBodies<D> {
         }
         for _ in 0..RELAXED_RINGS {
             near = nodes_of_cells_with(nodes, &near);
+            // A ring may reach a part through cells that it does not have.
+            space.join_marks(&mut near);
         }
         space.share_marks(&mut near);
         let relaxed = |n: &usize| near[*n] && space.is_free(*n);
