@@ -21,7 +21,7 @@ pub use aabb::Aabb;
 pub use algebra::{Matrix, Vector};
 pub use lattice::Lattice;
 pub use motion::{Particle, Pose, Twist, Wrench};
-pub use space::{Dim, Rotation, Spin};
+pub use space::{Dim, Rotation, Spin, ball_volume};
 
 /// The examples of the README.
 #[cfg(doctest)]

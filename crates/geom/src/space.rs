@@ -231,6 +231,12 @@ impl<'de, const D: usize> Deserialize<'de> for Rotation<D> {
     }
 }
 
+/// Volume of a sphere, area of a disc: `4 pi a^3 / 3`, `pi a^2`.
+pub fn ball_volume<const D: usize>(radius: f64) -> f64 {
+    let unit = if D == 2 { std::f64::consts::PI } else { 4.0 / 3.0 * std::f64::consts::PI };
+    unit * radius.powi(D as i32)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -243,6 +249,12 @@ mod tests {
         let other: f64 =
             Dim::<D>::spin_slice(&spin).iter().zip(Dim::<D>::spin_slice(&moment)).map(|(a, b)| a * b).sum();
         assert!((power - other).abs() < 1e-14);
+    }
+
+    #[test]
+    fn volumes_of_balls() {
+        assert!((ball_volume::<2>(2.0) - 12.566_370_614_359_172).abs() < 1e-14);
+        assert!((ball_volume::<3>(0.5) - std::f64::consts::FRAC_PI_6).abs() < 1e-15);
     }
 
     #[test]

@@ -1,6 +1,6 @@
 //! What a case is, in a few numbers.
 
-use gluey_suspension::ball_volume;
+use gluey_geom::ball_volume;
 use serde::Serialize;
 
 use crate::case::Case;

@@ -107,12 +107,6 @@ impl<const D: usize> Container<D> {
     }
 }
 
-/// Volume of a sphere, area of a disc: `4 pi a^3 / 3`, `pi a^2`.
-pub fn ball_volume<const D: usize>(radius: f64) -> f64 {
-    let unit = if D == 2 { std::f64::consts::PI } else { 4.0 / 3.0 * std::f64::consts::PI };
-    unit * radius.powi(D as i32)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -125,12 +119,6 @@ mod tests {
         assert!(container.lattice().nearest(&(wrapped - x)).0.norm() < 1e-13);
         let place = container.place(&wrapped);
         assert!((0..3).all(|d| (0.0..=[2.0, 1.0, 3.0][d]).contains(&place[d])), "{place}");
-    }
-
-    #[test]
-    fn volumes_of_balls() {
-        assert!((ball_volume::<2>(2.0) - 12.566_370_614_359_172).abs() < 1e-14);
-        assert!((ball_volume::<3>(0.5) - std::f64::consts::FRAC_PI_6).abs() < 1e-15);
     }
 
     #[test]

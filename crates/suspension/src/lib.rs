@@ -42,7 +42,7 @@ mod repulsion;
 pub mod statistics;
 pub mod structure;
 
-pub use container::{Container, ball_volume};
+pub use container::Container;
 pub use pairs::{NearPair, for_each_pair};
 pub use repulsion::{Repelled, repelled};
 

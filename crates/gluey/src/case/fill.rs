@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use gluey_suspension::ball_volume;
+use gluey_geom::ball_volume;
 use gluey_suspension::packing::{Packing, PackingError, PackingParams};
 
 use super::error::{CaseProblem, Key};

@@ -4,8 +4,8 @@ use std::f64::consts::PI;
 
 use gluey_contact::FlowContactParams;
 use gluey_contact::Repulsion;
+use gluey_geom::ball_volume;
 use gluey_geom::{Dim, Vector, Wrench};
-use gluey_suspension::ball_volume;
 
 use super::{Case, Metric, ParticleSpec, RepulsionSpec};
 

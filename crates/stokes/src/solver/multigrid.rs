@@ -17,12 +17,13 @@ use crate::film::FilmNetwork;
 use crate::formulation::Problem;
 use crate::operator::{Elements, PressureForces, StokesSystem, SystemOperator};
 use crate::precondition::schur::SchurInverse;
-use crate::precondition::velocity::{Hierarchy, LevelPlan, VCycle};
+use crate::precondition::velocity::{Hierarchy, LevelPlan, VCycle, relative_viscosity};
 use crate::precondition::{BlockTriangular, CycleLevels};
 use crate::space::{Discretisation, VelocitySpace, solid_nodes};
 
-/// Iterations between restarts.
-const RESTART: usize = 60;
+/// Iterations between restarts: a restart forgets the few modes that hold a crowd up. Most solves end before
+/// 60.
+const RESTART: usize = 150;
 /// Largest [`rounding_noise`] with which steps are taken in single precision. A few times more costs many
 /// iterations, see `docs/archive/experiments/0010-krylov-vectors.md`.
 const MOST_NOISE: f64 = 1.0;
@@ -162,9 +163,13 @@ fn velocity_cycle<const D: usize>(
         (space, false)
     });
     let spaces = coarser.chain([(finest, true)]);
-    let plan = |(space, is_finest)| LevelPlan { space, smoothing: rigidity.smoothing(levels, is_finest) };
+    let plan = |(space, is_finest): (VelocitySpace<D>, bool)| LevelPlan {
+        viscosity: system.viscosity() * relative_viscosity(space.discretisation(), all_bodies, held),
+        smoothing: rigidity.smoothing(levels, is_finest),
+        space,
+    };
     let plans = spaces.map(plan).collect();
-    VCycle::new(hierarchy, plans, correction, system.viscosity())
+    VCycle::new(hierarchy, plans, correction)
 }
 
 /// A residual at which a solve stops: this fraction of a norm.

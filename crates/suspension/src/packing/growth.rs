@@ -9,7 +9,8 @@ use rand_chacha::ChaCha8Rng;
 
 use super::separate::{self, Crowded};
 use super::{PackingError, monte_carlo};
-use crate::{Container, ball_volume};
+use crate::Container;
+use gluey_geom::ball_volume;
 
 /// Fraction at which points become particles: most do not meet.
 const FIRST_FRACTION: f64 = 0.05;

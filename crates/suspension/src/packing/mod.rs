@@ -18,7 +18,8 @@ pub use error::PackingError;
 pub use params::{Amount, PackingParams};
 pub use sizes::{LargeShare, Sizes};
 
-use crate::{Container, ball_volume, for_each_pair};
+use crate::{Container, for_each_pair};
+use gluey_geom::ball_volume;
 use params::mean;
 
 /// Sweeps of the whole for each one after a stage of growth.

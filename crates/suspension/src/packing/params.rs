@@ -5,7 +5,8 @@ use rand_chacha::ChaCha8Rng;
 
 use super::crystal::fitting_counts;
 use super::{Arrangement, PackingError, Sizes};
-use crate::{Container, ball_volume};
+use crate::Container;
+use gluey_geom::ball_volume;
 
 /// Radii that are drawn to know the mean volume of particles of several sizes.
 const SAMPLE_COUNT: usize = 1000;

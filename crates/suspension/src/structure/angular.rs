@@ -4,7 +4,8 @@ use std::f64::consts::PI;
 
 use gluey_geom::Vector;
 
-use crate::{Container, ball_volume, for_each_pair};
+use crate::{Container, for_each_pair};
+use gluey_geom::ball_volume;
 
 /// In 3D pairs count whose direction is so near the plane of shear: `|n_z|` at most this. Directions at
 /// random do with this probability.

@@ -104,7 +104,7 @@ mod tests {
     use gluey_geom::Aabb;
 
     use super::*;
-    use crate::ball_volume;
+    use gluey_geom::ball_volume;
 
     fn check<const D: usize>() {
         for is_periodic in [true, false] {

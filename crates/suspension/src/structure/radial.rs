@@ -2,7 +2,8 @@
 
 use gluey_geom::Vector;
 
-use crate::{Container, ball_volume, for_each_pair};
+use crate::{Container, for_each_pair};
+use gluey_geom::ball_volume;
 
 /// A bin of distances.
 #[derive(Clone, Copy, Debug, PartialEq)]

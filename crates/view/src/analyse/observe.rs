@@ -116,7 +116,7 @@ impl<const D: usize> Distributions<D> {
         let container = &first.container;
         let (a, edges) = (mean_radius(&first.radii), container.bounds().extent());
         let range = (RADIAL_RANGE * a).min(0.5 * edges.min());
-        let volume: f64 = first.radii.iter().map(|&radius| gluey_suspension::ball_volume::<D>(radius)).sum();
+        let volume: f64 = first.radii.iter().map(|&radius| gluey_geom::ball_volume::<D>(radius)).sum();
         let waves = container.lattice().is_periodic().then(|| {
             let width = TAU / edges.max();
             StructureFactor::new(WAVE_RANGE / a, width.max(WAVE_RANGE / a / 200.0))

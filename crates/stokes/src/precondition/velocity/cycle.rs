@@ -14,6 +14,8 @@ use crate::space::{VelocitySpace, norm};
 pub struct LevelPlan<const D: usize> {
     /// Velocities with the bodies' nodes eliminated.
     pub space: VelocitySpace<D>,
+    /// Its viscosity.
+    pub viscosity: f64,
     /// How it smooths, if it does.
     pub smoothing: Option<Smoothing>,
 }
@@ -33,8 +35,7 @@ pub struct VCycle<const D: usize> {
 }
 
 impl<const D: usize> VCycle<D> {
-    /// The cycle on the meshes of `hierarchy`, a plan for each, in a fluid of this viscosity. All ranks call
-    /// this.
+    /// The cycle on the meshes of `hierarchy`, a plan for each. All ranks call this.
     ///
     /// # Errors
     /// If a diagonal or the matrix of the coarsest level has no inverse, on all ranks.
@@ -42,13 +43,13 @@ impl<const D: usize> VCycle<D> {
         hierarchy: Hierarchy<D>,
         plans: Vec<LevelPlan<D>>,
         correction: Option<Box<dyn Correction>>,
-        viscosity: f64,
     ) -> Result<Self, StokesError> {
         let level = |(level, plan): (usize, LevelPlan<D>)| {
             let mesh = plan.space.discretisation().clone();
-            let made = Level::new(plan.space, viscosity, plan.smoothing);
+            let made = Level::new(plan.space, plan.viscosity, plan.smoothing);
             mesh.agreed(made.map_err(|source| StokesError::Smoother { level, source }))
         };
+        let viscosity = plans[0].viscosity;
         let levels = plans.into_iter().enumerate().map(level).collect::<Result<Vec<_>, _>>()?;
         let coarse = levels[0].space.whole().map(|space| CoarseSolver::new(space, viscosity));
         let coarse = levels[0].space.discretisation().agreed(coarse.transpose())?;
