@@ -20,6 +20,7 @@ use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
+use anyhow::bail;
 use clap::ValueEnum;
 
 use crate::book::progress::Board;
@@ -53,6 +54,9 @@ pub struct StudyOptions {
     /// Few points and short runs: minutes.
     #[arg(long)]
     quick: bool,
+    /// Of the runs only these, by the names of their folders.
+    #[arg(long, value_name = "RUN", value_delimiter = ',')]
+    only: Vec<String>,
     /// Output folder [default: target/studies/NAME].
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
@@ -78,15 +82,16 @@ impl Name {
 /// and on the page.
 ///
 /// # Errors
-/// If nothing can be written.
+/// If there is no such run, or nothing can be written.
 pub fn run(options: &StudyOptions) -> anyhow::Result<bool> {
     let start = Instant::now();
     let (study, quick) = (options.name.study(), options.quick);
     let folder = Path::new(if quick { "target/studies/quick" } else { "target/studies" });
     let name = options.name.to_possible_value().expect("every study has a name");
     let out = &options.out.clone().unwrap_or_else(|| folder.join(name.get_name()));
+    let all = (study.points)(quick);
+    let (points, board) = (among(&all, &options.only)?, Board::new());
     files::prepare_folder(out)?;
-    let (points, board) = ((study.points)(quick), Board::new());
     let data = workspace_root().join("data/studies");
     let run = |point: &StudyPoint| point.run(&data, &out.join("runs"), &board);
     let results = schedule::in_parallel(&points, jobs(options.jobs), run);
@@ -100,12 +105,21 @@ pub fn run(options: &StudyOptions) -> anyhow::Result<bool> {
     for (name, drawing) in &findings.drawings {
         write_drawing(out, name, drawing, &mut failures)?;
     }
-    let effort = page::effort(&done, start.elapsed().as_secs_f64());
+    let effort = page::effort(&done, all.len(), start.elapsed().as_secs_f64());
     let html = page::html(&study, &findings, &failures, quick, &effort);
     files::write(&out.join("index.html"), html.as_bytes())?;
     println!("table.csv, pictures and index.html are in {}", out.display());
     failures.iter().for_each(|failure| eprintln!("error: {}: {}", failure.what, failure.error));
     Ok(failures.is_empty())
+}
+
+/// Of all points those with these names, or all where none is given.
+fn among(all: &[StudyPoint], names: &[String]) -> anyhow::Result<Vec<StudyPoint>> {
+    if let Some(unknown) = names.iter().find(|name| all.iter().all(|point| point.name != **name)) {
+        let all = all.iter().map(|point| point.name.as_str()).collect::<Vec<_>>().join(", ");
+        bail!("--only: the study has no run `{unknown}`; its runs are {all}");
+    }
+    Ok(all.iter().filter(|point| names.is_empty() || names.contains(&point.name)).cloned().collect())
 }
 
 #[cfg(test)]
@@ -127,6 +141,12 @@ mod tests {
             assert!(quick.len() < all.len());
             let names: BTreeSet<&str> = all.iter().map(|point| &point.name[..]).collect();
             assert_eq!(names.len(), all.len());
+            let [first, last] = [&all[0], &all[all.len() - 1]].map(|point| point.name.clone());
+            let some = among(&all, &[last.clone(), first.clone()]).unwrap();
+            assert_eq!(some.iter().map(|point| &point.name).collect::<Vec<_>>(), [&first, &last]);
+            assert_eq!(among(&all, &[]).unwrap().len(), all.len());
+            let error = among(&all, &["none".to_owned()]).unwrap_err().to_string();
+            assert!(error.contains("no run `none`") && error.contains(&last), "{error}");
         }
     }
 }

@@ -7,8 +7,8 @@ use super::point::Done;
 use crate::book::BookFailure;
 use crate::book::page::{self, escape};
 
-/// What a study took, as HTML; earlier runs count with the time that they took then.
-pub fn effort(done: &[Done], wall_s: f64) -> String {
+/// What a study of so many runs took, as HTML; earlier runs count with the time that they took then.
+pub fn effort(done: &[Done], run_count: usize, wall_s: f64) -> String {
     let run_s = done.iter().map(|done| done.report.wall_s).sum();
     let built = || done.iter().filter_map(|done| done.report.cells_per_radius);
     let [least, most] = [built().fold(f64::INFINITY, f64::min), built().fold(0.0, f64::max)];
@@ -20,7 +20,7 @@ pub fn effort(done: &[Done], wall_s: f64) -> String {
     };
     let (count, all, own) = (done.len(), duration(run_s), duration(wall_s));
     let version = env!("CARGO_PKG_VERSION");
-    format!("{cells}<p>{count} runs of {all} in all; this command took {own}. gluey {version}.</p>\n")
+    format!("{cells}<p>{count} of {run_count} runs, {all} in all; this command took {own}. gluey {version}.</p>\n")
 }
 
 /// The table as CSV; names lose their commas.
