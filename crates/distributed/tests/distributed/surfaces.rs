@@ -12,8 +12,8 @@ use gluey_stokes::{
 
 use crate::support::{is_in_fluid, on_ranks, velocities};
 
-/// Ten times less than what ranks may differ by: the weights of the pressures of a part lack what distant cells
-/// add at hanging nodes, so that its iterates are others, each as good.
+/// Ten times less than what ranks may differ by: the weights of the pressures of a part lack what distant
+/// cells add at hanging nodes, so that its iterates are others, each as good.
 const TOLERANCE: f64 = 1e-12;
 /// What ranks may differ by in 2D, with hanging nodes.
 const LIMIT: f64 = 1e-11;

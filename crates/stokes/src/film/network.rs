@@ -1,12 +1,12 @@
 //! The block of the system for the twists of the bodies and the forces of films, solved exactly.
 //!
-//! With the surfaces' own block `A_b` of the twists and the rows `s B` of the films the block is
+//! With about the resistances `R` of the bodies by themselves and the rows `s B` of the films the block is
 //!
-//! `[A_b, s B^T; s B, -1]`, or `K = A_b + s^2 B^T B` without the forces,
+//! `[R, s B^T; s B, -1]`, or `K = R + s^2 B^T B` without the forces,
 //!
 //! which is sparse, symmetric and positive definite. A correction `(v, g)` of twists and forces with
 //! `K v = s B^T r`, `g = s B v - r` makes residuals `r` of the rows vanish and changes the other residuals by
-//! no more than the least that any such correction does, in the metric of `A_b`. The scales `s` grow without
+//! no more than the least that any such correction does, in the metric of `R`. The scales `s` grow without
 //! bound as films close. A residual that is small beside the loads on the bodies may still stand for a large
 //! part of the speed at which a film closes, which is the smaller the thinner the film: rows that hold
 //! exactly leave nothing of it, and are judged by nothing but the loads.
@@ -123,9 +123,9 @@ impl SharedTwists {
 }
 
 impl FilmNetwork {
-    /// Of bodies with these blocks of the surfaces for their twists, row by row, some of which may be `held`
-    /// (no entries stand for none), and the rows of `all` films, of which those of `own` films have their
-    /// forces in vectors here. `None` without films.
+    /// Of bodies with these resistances, a block for the twist of each, row by row, some of which may be
+    /// `held` (no entries stand for none), and the rows of `all` films, of which those of `own` films have
+    /// their forces in vectors here. `None` without films.
     ///
     /// # Errors
     /// [`DirectError`] if the block of a body is not positive definite.

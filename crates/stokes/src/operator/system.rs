@@ -21,6 +21,10 @@ use crate::space::{
 use crate::surface::SurfaceCoupling;
 use crate::term::{Product, Scratch, Term, Terms, add_terms};
 
+/// Resistance of a body, which takes the fluid along, over the surfaces' own block of its twist, which is
+/// that of fluid at rest: by the iterations of crowds, see `docs/design/preconditioner.md`.
+const OF_MOVING_FLUID: f64 = 0.2;
+
 /// Operator of the Stokes problem on a mesh, matrix-free.
 #[derive(Clone, Debug)]
 pub struct StokesSystem<const D: usize> {
@@ -169,7 +173,7 @@ impl<const D: usize> StokesSystem<D> {
     pub fn film_network(&self) -> Result<Option<FilmNetwork>, DirectError> {
         let own = self.films().map_or_else(Vec::new, |films| films.rows_of_motion(self.space.full_dim()));
         let Some(partition) = self.discretisation().partition() else {
-            let blocks = if own.is_empty() { Vec::new() } else { self.twist_blocks() };
+            let blocks = if own.is_empty() { Vec::new() } else { resistances(self.twist_blocks()) };
             return FilmNetwork::new::<D>(&blocks, self.space.held(), &own, own.clone());
         };
         let (ranks, bodies) = (&partition.ranks, partition.bodies.ids.clone());
@@ -177,6 +181,7 @@ impl<const D: usize> StokesSystem<D> {
         let numbers: Vec<_> = own.iter().copied().map(FilmRow::to_numbers).collect();
         let all: Vec<_> = ranks.gathered(&numbers).iter().map(FilmRow::from_numbers).collect();
         let blocks = partition.sums_of_bodies(&self.twist_blocks(), Dim::<D>::RIGID.pow(2));
+        let blocks = resistances(blocks);
         let is_own = partition.bodies.owners.iter().map(|&owner| owner == ranks.rank()).collect();
         let twists = SharedTwists { halo: self.halo().clone(), bodies, is_own };
         let network = FilmNetwork::new::<D>(&blocks, self.space.held_of_all(), &all, own)?;
@@ -293,6 +298,12 @@ struct OperatorWork<X> {
     pressure: Vec<X>,
     cells: Workspace<f64, X>,
     scratch: Scratch<f64>,
+}
+
+/// About the resistances of bodies whose surfaces have these blocks for their twists.
+fn resistances(mut blocks: Vec<f64>) -> Vec<f64> {
+    blocks.iter_mut().for_each(|entry| *entry *= OF_MOVING_FLUID);
+    blocks
 }
 
 impl<'a, const D: usize> SystemOperator<'a, D> {
