@@ -20,7 +20,9 @@ pub fn effort(done: &[Done], run_count: usize, wall_s: f64) -> String {
     };
     let (count, all, own) = (done.len(), duration(run_s), duration(wall_s));
     let version = env!("CARGO_PKG_VERSION");
-    format!("{cells}<p>{count} of {run_count} runs, {all} in all; this command took {own}. gluey {version}.</p>\n")
+    format!(
+        "{cells}<p>{count} of {run_count} runs, {all} in all; this command took {own}. gluey {version}.</p>\n"
+    )
 }
 
 /// The table as CSV; names lose their commas.
