@@ -18,6 +18,7 @@ mod rough;
 mod runs;
 mod shear_stress;
 mod sheared;
+mod step_tolerance;
 mod strategies;
 mod surroundings;
 mod suspension;

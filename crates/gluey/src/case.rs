@@ -216,6 +216,13 @@ pub struct TimeSpec {
     #[serde(default = "default_halvings")]
     #[schemars(range(max = 20))]
     pub halvings: u32,
+    /// Error that the time scheme may make in a part of a step, in positions over radii, in root mean square
+    /// over the particles, as estimated from how velocities bend. Steps are done in two halves, these in
+    /// halves again, `halvings` times at most, until it is no larger; rows stay where they are. Steps that
+    /// turn out to have a larger one are counted. Unit: none. Default: none, steps are done in one part.
+    #[serde(default)]
+    #[schemars(extend("exclusiveMinimum" = 0))]
+    pub tolerance: Option<f64>,
     /// The shear is reversed at the first step that starts at this time or later. Unit: time. Default: never.
     #[serde(default)]
     #[schemars(extend("exclusiveMinimum" = 0))]

@@ -22,7 +22,7 @@ use crate::simulation::{RestoreError, SimulationState};
 use crate::tally::Tally;
 
 /// Counts changes of the layout of [`Checkpoint`].
-const VERSION: u32 = 18;
+const VERSION: u32 = 19;
 const KIND: FileKind = FileKind { magic: b"gluey-ck", layout: VERSION };
 
 /// A run between two steps.

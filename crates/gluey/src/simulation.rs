@@ -1,5 +1,6 @@
 //! The time loop, one step at a time: predict, correct for contact, integrate.
 
+mod accuracy;
 mod error;
 mod films;
 mod in_contact;
@@ -17,6 +18,7 @@ use gluey_motion::{
 
 use crate::phases::PhaseTable;
 use crate::tally::StepMotion;
+use accuracy::Accuracy;
 use in_contact::{StepStart, predicted_in_contact};
 use part::Part;
 use repelling::Repelling;
@@ -55,6 +57,7 @@ pub struct Simulation<const D: usize, H, C> {
     part: Part,
     /// A step is halved so often at most.
     most_halvings: u32,
+    accuracy: Accuracy<D>,
     reversed: bool,
     sliding: Option<Sliding>,
     repelling: Option<Repelling<D>>,
@@ -100,6 +103,7 @@ where
             step: 0,
             part: Part::WHOLE,
             most_halvings: 0,
+            accuracy: Accuracy::new(scheme),
             reversed: false,
             sliding: None,
             repelling: None,
@@ -131,6 +135,15 @@ where
     #[must_use]
     pub fn halving(self, most_halvings: u32) -> Self {
         Self { most_halvings, ..self }
+    }
+
+    /// The same where a step is done in parts, halves of halves up to as often as steps may be halved, in
+    /// which the time scheme errs by no more than this, as estimated: in radii, in root mean square over the
+    /// particles ([`gluey_motion::ErrorEstimate`]). What an estimate before a part had missed is counted.
+    #[must_use]
+    pub fn within(mut self, tolerance: f64) -> Self {
+        self.accuracy.tolerance = Some(tolerance);
+        self
     }
 
     /// The same where contacts whose forces act in the flow are iterated for so long.
@@ -197,6 +210,7 @@ where
         if is_first {
             (self.part, self.motion) = (Part::WHOLE, StepMotion::default());
         }
+        self.part = self.accuracy.begin(self.part, self.dt, self.most_halvings);
         let (step, time) = (self.step, self.time());
         let start = std::time::Instant::now();
         let predicted = self.predicted();
@@ -234,6 +248,7 @@ where
             dt: self.dt,
             part: self.part,
             most_halvings: self.most_halvings,
+            accuracy: &self.accuracy,
             limits: self.iteration,
             tilt,
             slide: self.slide(),
@@ -267,9 +282,11 @@ where
     pub fn correct(&mut self) -> Result<(), StepError<H::Error>> {
         if let Some(contact) = self.contact.in_flow() {
             contact.finish();
+            self.note_error();
             return Ok(());
         }
         let films = self.keep_apart()?;
+        self.note_error();
         let (step, time, dt) = (self.step, self.time(), self.part_length());
         if let Some(Sliding { height, .. }) = self.sliding {
             self.contact.set_sliding(self.strain * height, self.sliding_rate() * height * dt);
@@ -288,6 +305,14 @@ where
         }
         self.gaps.films.largest_push = self.gaps.films.largest_push.max(films.largest_push);
         Ok(())
+    }
+
+    /// Notes how accurate the last part was, from the velocities before contacts that correct them after the
+    /// flow: those jump.
+    fn note_error(&mut self) {
+        let length = self.part_length();
+        let Self { accuracy, particles, prediction, motion, .. } = self;
+        accuracy.note(&prediction.twists, particles, length, motion);
     }
 
     /// Moves the particles with the corrected velocities. Where these are for a part of the step only, the
@@ -328,6 +353,7 @@ where
             true => self.integrator.restart(),
             false => self.integrator.reverse(),
         }
+        self.accuracy.estimate.restart();
         self.films.reverse();
         self.contact.reverse();
     }
@@ -425,6 +451,7 @@ where
             clock: self.clock.clone(),
             particles: self.particles.clone(),
             integrator: self.integrator.clone(),
+            estimate: self.accuracy.estimate.clone(),
             films: self.films.clone(),
             repelling: self.repelling.as_ref().map(Repelling::checkpoint).unwrap_or_default(),
             contact: self.contact.checkpoint(),
@@ -451,6 +478,7 @@ where
         self.clock = state.clock;
         self.particles = state.particles;
         self.integrator = state.integrator;
+        self.accuracy.estimate = state.estimate;
         self.films = state.films;
         Ok(())
     }

@@ -19,6 +19,11 @@ pub struct StepMotion {
     pub shortest: f64,
     /// Why the step was halved, where it was: what was found at the shortest length that could not be done.
     pub refused: Option<String>,
+    /// The largest error of the time scheme in the parts that led to the velocities of this step, as
+    /// estimated: in radii, in root mean square over the particles. 0 in the first step and after a reversal.
+    pub error: f64,
+    /// Whether that is more than the tolerance, where there is one.
+    pub is_inaccurate: bool,
 }
 
 /// Steps that were halved, films that closed, penalties that were changed.
@@ -30,6 +35,10 @@ pub struct Tally {
     pub halved_steps: usize,
     /// The shortest part, as a share of a step; 1 where none was halved, 0 before any.
     pub shortest_part: f64,
+    /// Largest error of the time scheme in a part of a step, as estimated, in radii.
+    pub step_error: f64,
+    /// Steps in which that was more than the tolerance, where there is one.
+    pub inaccurate_steps: usize,
     /// Most films that were closed at once: their gaps of 0.5e-9 to 1e-9 radii are a floor and no
     /// measurement.
     pub closed_films: usize,
@@ -49,7 +58,9 @@ pub struct Tally {
 impl Tally {
     /// Adds a step.
     pub(crate) fn add(&mut self, motion: &StepMotion, films: &FilmReport, flow: &FlowStatistics) {
-        self.halved_steps += usize::from(motion.parts > 1);
+        self.halved_steps += usize::from(motion.refused.is_some() && motion.parts > 1);
+        self.step_error = self.step_error.max(motion.error);
+        self.inaccurate_steps += usize::from(motion.is_inaccurate);
         if motion.parts > 0 {
             let before = if self.shortest_part > 0.0 { self.shortest_part } else { 1.0 };
             self.shortest_part = before.min(motion.shortest);
@@ -72,11 +83,18 @@ impl Tally {
 impl fmt::Display for Tally {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self { halved_steps, closed_films, rows_with_closed_films, film_push, .. } = self;
+        let Self { inaccurate_steps, step_error, .. } = self;
         if *halved_steps > 0 {
             writeln!(
                 f,
                 "  steps done in parts: {halved_steps}, the shortest part 1/{} of a step",
                 self.shortest_part.recip()
+            )?;
+        }
+        if *inaccurate_steps > 0 {
+            writeln!(
+                f,
+                "  steps less accurate than time.tolerance: {inaccurate_steps}, their error {step_error:.1e} radii at most"
             )?;
         }
         if *closed_films > 0 {
@@ -110,12 +128,19 @@ mod tests {
         let whole = StepMotion { parts: 1, shortest: 1.0, ..StepMotion::default() };
         tally.add(&whole, &FilmReport::default(), &FlowStatistics::default());
         assert_eq!((tally.shortest_part, tally.to_string().as_str()), (1.0, ""));
-        let halved = StepMotion { parts: 3, shortest: 0.25, refused: None };
+        let halved = StepMotion {
+            parts: 3,
+            shortest: 0.25,
+            refused: Some("films".to_owned()),
+            error: 2e-3,
+            is_inaccurate: true,
+        };
         let films = FilmReport { closed_count: 2, largest_push: 0.5 };
         let flow = FlowStatistics { cells_raised: 4, solved_again: 1, ..FlowStatistics::default() };
         tally.add(&halved, &films, &flow);
         let told = tally.to_string();
         assert!(told.contains("in parts: 1, the shortest part 1/4") && told.contains("2 at most, in 1 rows"));
+        assert!(told.contains("time.tolerance: 1, their error 2.0e-3"), "{told}");
         assert!(told.contains("5.00e-1 radii") && told.contains("in 4 cells; 1 flows"), "{told}");
     }
 }

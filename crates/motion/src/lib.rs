@@ -26,6 +26,7 @@
 //! Not for inertia: velocities follow positions at once (Stokes flow), there is no mass and no acceleration.
 
 mod approach;
+mod error_estimate;
 mod hydrodynamics;
 mod integrator;
 mod linear_flow;
@@ -33,6 +34,7 @@ mod mobility_table;
 mod pair_mobility;
 
 pub use approach::approach_mobility;
+pub use error_estimate::ErrorEstimate;
 /// Names of what [`Hydrodynamics::films`] and [`Hydrodynamics::near_mobility`] return.
 pub use gluey_contact::{Film, LoneDrag, PairKey, TwistMobility};
 pub use hydrodynamics::{

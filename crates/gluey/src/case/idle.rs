@@ -38,7 +38,7 @@ impl Case {
         case.contact = ContactSpec { strategy, metric, ..ContactSpec::default() };
         case.repulsion = RepulsionSpec::default();
         case.domain.boundary = Boundary::default();
-        (case.time.reverse_at, case.time.strain_amplitude) = (None, None);
+        (case.time.reverse_at, case.time.strain_amplitude, case.time.tolerance) = (None, None, None);
         case
     }
 
@@ -75,6 +75,9 @@ impl Case {
             add(&["contact.flow_tolerance"], format!("contact.metric = \"{}\"", Metric::Drag));
         }
         add(&idle_of_contact(&self.contact), format!("contact.strategy = \"{}\"", self.contact.strategy));
+        if self.time.halvings == 0 {
+            add(&["time.tolerance"], "time.halvings = 0".to_owned());
+        }
         if self.repulsion.force == 0.0 {
             add(&["repulsion.range"], "repulsion.force = 0".to_owned());
         }
@@ -238,6 +241,8 @@ mod tests {
         let late = "time = { step = 0.1, end = 1.0, reverse_at = 2.0 }";
         assert_eq!(idle(2, late), ["time.reverse_at: time.end = 1, before the shear turns round"]);
         assert!(idle(2, "time = { step = 0.1, end = 1.0, reverse_at = 0.5 }").is_empty());
+        let whole = "time = { step = 0.1, end = 1.0, halvings = 0, tolerance = 1e-3 }";
+        assert_eq!(idle(2, whole), ["time.tolerance: time.halvings = 0"]);
         let wide = "time = { step = 0.1, end = 1.0, strain_amplitude = 2.0 }";
         assert_eq!(idle(2, wide), ["time.strain_amplitude: time.end = 1, before the shear turns round"]);
         let frames = "output = [{ kind = \"xyz\", every = 1, fields = false, precision = \"f32\" }]";

@@ -17,7 +17,7 @@ use crate::tally::StepMotion;
 
 /// What is the same on every run.
 const FACTS: &str = "step,t,strain,cells,unknowns,solves,iterations,residual,\
-     contact_pairs,active_contacts,sliding_contacts,contact_iterations,flows_in_contact,contact_change,parts,closed_films,film_push_over_radius,\
+     contact_pairs,active_contacts,sliding_contacts,contact_iterations,flows_in_contact,contact_change,parts,step_error_over_radius,closed_films,film_push_over_radius,\
      penalties_doubled,cells_raised";
 
 /// Phases of a step, as [`PhaseTable`] names them, and the columns of their seconds.
@@ -112,10 +112,10 @@ fn facts(row: &SolverRow<'_>) -> String {
     let ContactReport { pair_count, active_count, sliding_count, iterations, .. } = gaps.contacts;
     let FilmReport { closed_count, largest_push } = gaps.films;
     let (flows, change) = (gaps.changes.len(), gaps.changes.last().copied().unwrap_or(0.0));
-    let StepMotion { parts, .. } = motion;
+    let StepMotion { parts, error, .. } = motion;
     format!(
         "{step},{time:.16e},{strain:.16e},{cell_count},{dof_count},{solve_count},{iteration_count},\
-         {residual:.3e},{pair_count},{active_count},{sliding_count},{iterations},{flows},{change:.3e},{parts},{closed_count},{largest_push:.3e},\
+         {residual:.3e},{pair_count},{active_count},{sliding_count},{iterations},{flows},{change:.3e},{parts},{error:.3e},{closed_count},{largest_push:.3e},\
          {penalties_doubled},{cells_raised},"
     )
 }

@@ -18,6 +18,9 @@ where
     let mut simulation = Simulation::new(case.start(), scheme, dt, hydrodynamics, contact);
     let iteration = FlowIteration { tolerance: case.contact.flow_tolerance(), ..FlowIteration::default() };
     simulation = simulation.halving(case.time.halvings).iterating(iteration);
+    if let Some(tolerance) = case.time.tolerance {
+        simulation = simulation.within(tolerance);
+    }
     if case.has_forces() {
         simulation = simulation.under_forces();
     }

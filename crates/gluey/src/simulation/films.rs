@@ -5,6 +5,7 @@ use gluey_geom::Twist;
 use gluey_motion::{Configuration, Hydrodynamics, NoForces};
 
 use super::error::{StepError, end_after, half_after};
+use super::part::Part;
 use super::repelling::Repelling;
 use super::{Simulation, Sliding};
 
@@ -14,16 +15,22 @@ where
     C: ContactModel<D>,
 {
     /// Lets particles repel each other and films stay open in the part of the step that is to be done, which
-    /// is halved until they do.
+    /// is halved until they do, and until the time scheme is accurate.
     pub(super) fn keep_apart(&mut self) -> Result<FilmReport, StepError<H::Error>> {
         let mut mobility = self.mobility_of_repulsion()?;
-        let predicted = self.prediction.twists.clone();
+        let (predicted, films) = (self.prediction.twists.clone(), self.films.clone());
         loop {
             let repelled =
                 mobility.as_deref_mut().map_or(Ok(()), |mobility| self.repel(mobility, &predicted));
             let opened = repelled.map_err(GapError::from);
             let error = match opened.and_then(|()| Ok(self.open_films()?)) {
                 Ok(report) => {
+                    if let Some(half) = self.half_for_accuracy() {
+                        self.part = half;
+                        self.films = films.clone();
+                        self.prediction.twists.copy_from_slice(&predicted);
+                        continue;
+                    }
                     self.repelling.iter_mut().for_each(Repelling::finish);
                     return Ok(report);
                 }
@@ -34,6 +41,11 @@ where
             self.part = half.ok_or_else(|| end_after(error, step, time, length))?;
             self.motion.refused = Some(reason);
         }
+    }
+
+    fn half_for_accuracy(&self) -> Option<Part> {
+        let Self { accuracy, part, most_halvings, dt, prediction, particles, .. } = self;
+        accuracy.half_of(*part, *most_halvings, *dt, &prediction.twists, particles)
     }
 
     /// The mobility in which the repulsion of the step is sought.

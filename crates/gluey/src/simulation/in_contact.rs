@@ -7,6 +7,7 @@ use gluey_contact::{
 use gluey_geom::{Particle, Twist};
 use gluey_motion::{Configuration, ContactLoads, Hydrodynamics, Integrator, NoForces, Prediction};
 
+use super::accuracy::Accuracy;
 use super::error::{StepError, end_after, half_after};
 use super::part::Part;
 
@@ -39,6 +40,8 @@ pub(super) struct StepStart<'a, const D: usize> {
     /// Halved where contacts find no forces.
     pub part: Part,
     pub most_halvings: u32,
+    /// Halved, too, where the time scheme would err by too much.
+    pub accuracy: &'a Accuracy<D>,
     pub limits: FlowIteration,
     /// Displacement of the image one period up, its velocity, and the rate of the shear.
     pub tilt: f64,
@@ -164,12 +167,18 @@ impl<const D: usize> ContactIteration<'_, D> {
         loads.map_err(|error| self.corrected = Err(error.into())).ok()
     }
 
-    /// Halves the step until there are forces, and films are in balance.
+    /// Halves the step until there are forces, films are in balance, and the time scheme is accurate.
     fn correct(&mut self, flow: &[Twist<D>]) -> Result<Corrected<D>, GapError> {
         loop {
-            let StepStart { part, most_halvings, .. } = self.start;
+            let StepStart { part, most_halvings, accuracy, dt, .. } = self.start;
             match self.try_to_correct(flow) {
-                Ok(corrected) => return Ok(corrected),
+                Ok(corrected) => {
+                    let half = accuracy.half_of(part, most_halvings, dt, &corrected.twists, self.particles);
+                    match half {
+                        Some(half) => self.start.part = half,
+                        None => return Ok(corrected),
+                    }
+                }
                 Err(error) => {
                     self.refused = Some(error.to_string());
                     self.start.part = half_after(&error, part, most_halvings).ok_or(error)?;

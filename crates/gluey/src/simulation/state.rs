@@ -2,7 +2,7 @@
 
 use gluey_contact::{ContactState, FilmMemory};
 use gluey_geom::Particle;
-use gluey_motion::Integrator;
+use gluey_motion::{ErrorEstimate, Integrator};
 
 use super::strain_clock::StrainClock;
 
@@ -22,6 +22,8 @@ pub struct SimulationState<const D: usize> {
     pub particles: Vec<Particle<D>>,
     /// Velocity history.
     pub integrator: Integrator<D>,
+    /// What errors of steps are estimated from.
+    pub estimate: ErrorEstimate<D>,
     /// Memory of films.
     pub films: FilmMemory,
     /// Forces by which particles repelled each other, where no contact in the flow has them.
