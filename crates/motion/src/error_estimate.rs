@@ -70,14 +70,17 @@ impl<const D: usize> ErrorEstimate<D> {
 
     /// Remembers a step of this length with the velocities `twists`.
     pub fn advance(&mut self, length: f64, twists: &[Twist<D>]) {
-        let of_line = if self.lengths[0] > 0.0 { length / self.lengths[0] } else { 0.0 };
-        let slope = if self.scheme == Scheme::AdamsBashforth2 { of_line } else { 0.0 };
-        let before = self.last.iter().copied().map(Some).chain(std::iter::repeat(None));
-        let expected = twists.iter().zip(before).map(|(twist, before)| {
-            twist.velocity + (twist.velocity - before.unwrap_or(twist.velocity)) * slope
-        });
-        self.expected = expected.collect();
-        self.last = twists.iter().map(|twist| twist.velocity).collect();
+        let slope = match self.scheme {
+            Scheme::Euler => 0.0,
+            Scheme::AdamsBashforth2 => length / self.lengths[0],
+        };
+        let now: Vec<_> = twists.iter().map(|twist| twist.velocity).collect();
+        self.expected.clone_from(&now);
+        for (expected, before) in self.expected.iter_mut().zip(&self.last) {
+            let change = (*expected - before) * slope;
+            *expected += change;
+        }
+        self.last = now;
         self.lengths = [length, self.lengths[0]];
     }
 
