@@ -191,6 +191,18 @@ impl FilmNetwork {
         Ok(motions)
     }
 
+    /// The sums of the entries of own rows times `factors`, over all ranks: zero for bodies that are held.
+    fn add_up(&self, factors: impl Iterator<Item = f64>, load: &mut [f64]) {
+        load.fill(0.0);
+        for (row, factor) in self.rows.iter().zip(factors) {
+            row.entries(self.rigid).for_each(|(k, weight)| load[k] += weight * factor);
+        }
+        if let Some(shared) = &self.shared {
+            shared.halo.sum_over_ranks(load);
+        }
+        self.clear_held(load);
+    }
+
     fn clear_held(&self, load: &mut [f64]) {
         let bodies = load.chunks_exact_mut(self.rigid).zip(&self.held);
         bodies.filter(|(_, held)| **held).for_each(|(load, _)| load.fill(0.0));
@@ -212,7 +224,7 @@ pub struct FilmCorrection<'n> {
 impl FilmCorrection<'_> {
     /// Changes the twists of all bodies and the forces `g` of own films so that `s B V - g = b` holds in the
     /// rows of motion. All ranks call this.
-    pub fn apply<S: Scalar>(&mut self, b: &[S], twists: &mut [S], g: &mut [S]) {
+    pub fn apply<S: Scalar, T: Scalar>(&mut self, b: &[S], twists: &mut [T], g: &mut [S]) {
         let network = self.network;
         let Some(shared) = &network.shared else { return self.correct(b, twists, g) };
         let mut all = std::mem::take(&mut self.all);
@@ -228,19 +240,26 @@ impl FilmCorrection<'_> {
         self.all = all;
     }
 
+    /// Writes the loads `s B^T g` on the bodies that vectors here have of forces `g` of own films, told by the
+    /// number of their row. All ranks call this.
+    pub fn loads(&mut self, g: impl Fn(usize) -> f64, loads: &mut [f64]) {
+        let Self { network, load, .. } = self;
+        network.add_up(network.rows.iter().map(|row| g(row.row as usize)), load);
+        let Some(SharedTwists { bodies, .. }) = &network.shared else { return loads.copy_from_slice(load) };
+        let rigid = network.rigid;
+        for (loads, &body) in loads.chunks_exact_mut(rigid).zip(bodies) {
+            loads.copy_from_slice(&load[body as usize * rigid..][..rigid]);
+        }
+    }
+
     fn correct<S: Scalar, T: Scalar>(&mut self, b: &[S], twists: &mut [T], g: &mut [S]) {
         let Self { network, factor, residuals, load, twists: change, .. } = self;
         let rigid = network.rigid;
-        load.fill(0.0);
         for (row, residual) in network.rows.iter().zip(&mut *residuals) {
             let at = row.row as usize;
             *residual = b[at].to_f64() - row.motion(rigid, twists) + g[at].to_f64();
-            row.entries(rigid).for_each(|(k, weight)| load[k] += weight * *residual);
         }
-        if let Some(shared) = &network.shared {
-            shared.halo.sum_over_ranks(load);
-        }
-        network.clear_held(load);
+        network.add_up(residuals.iter().copied(), load);
         factor.apply(load, change);
         let sums = twists.iter_mut().zip(&*change);
         sums.for_each(|(twist, change)| *twist = T::from_f64(twist.to_f64() + change));

@@ -5,11 +5,13 @@ use gluey_parallel::Halo;
 
 use crate::film::FilmCorrection;
 use crate::operator::{PressureForces, StokesSystem};
+use crate::precondition::Ties;
 use crate::precondition::schur::SchurInverse;
 use crate::precondition::velocity::VCycle;
 
-/// `z_p = -S^-1 r_p`, `z_u = V (r_u + B^T z_p)`; the forces of terms join the pressures. Then the films' rows
-/// of motions are made to hold ([`FilmCorrection`]), so that no step opens them.
+/// `z_p = -S^-1 r_p`, `z_u = V (r_u + B^T z_p)`; the forces of terms join the pressures. The films' rows of
+/// motions are made to hold ([`FilmCorrection`]) inside of the cycle, so that the fluid follows, and after
+/// it, so that no step opens them.
 pub struct BlockTriangular<'a, const D: usize> {
     system: &'a StokesSystem<D>,
     forces: &'a mut PressureForces<D>,
@@ -20,6 +22,8 @@ pub struct BlockTriangular<'a, const D: usize> {
     /// `z_p`.
     answer: Vec<f32>,
     films: Option<FilmCorrection<'a>>,
+    /// Forces of terms before the cycle.
+    term_forces: Vec<f64>,
     /// Of velocities and of pressures.
     halos: [Halo; 2],
 }
@@ -41,6 +45,7 @@ impl<'a, const D: usize> BlockTriangular<'a, D> {
             pressure: zeros(),
             answer: zeros(),
             films,
+            term_forces: Vec::new(),
             halos: [system.halos().velocities.clone(), system.pressure.halo().clone()],
         }
     }
@@ -55,7 +60,8 @@ impl<S: Scalar, const D: usize> Preconditioner<S> for BlockTriangular<'_, D> {
             schur,
             pressure,
             answer,
-            films: correction,
+            films,
+            term_forces,
             halos: [of_velocities, of_pressures],
         } = self;
         let [ru, rp, rf] = system.parts(r);
@@ -72,10 +78,19 @@ impl<S: Scalar, const D: usize> Preconditioner<S> for BlockTriangular<'_, D> {
         vector::copy(answer, pressure);
         of_pressures.update(pressure);
         system.pressure.expand(pressure);
-        cycle.answer(ru, |load| forces.set(system, pressure, zf, load), zu, of_velocities);
+        term_forces.clear();
+        term_forces.extend(zf.iter().map(|z| z.to_f64()));
+        let mut ties = films.as_mut().map(|films| {
+            |twists: &mut [f64], loads: &mut [f64]| {
+                films.apply(rf, twists, zf);
+                films.loads(|row| zf[row].to_f64() - term_forces[row], loads);
+            }
+        });
+        let ties = ties.as_mut().map(|ties| ties as Ties<'_>);
+        cycle.answer(ru, |load| forces.set(system, pressure, term_forces, load), zu, of_velocities, ties);
         system.space.clear_held(zu);
-        if let Some(correction) = correction {
-            correction.apply(rf, &mut zu[system.space.full_dim()..], zf);
+        if let Some(films) = films {
+            films.apply(rf, &mut zu[system.space.full_dim()..], zf);
         }
     }
 }

@@ -152,6 +152,11 @@ impl<const D: usize> Discretisation<D> {
         self.partition().map_or(0..self.pressure.node_count(), |part| part.pressure.owned.clone())
     }
 
+    /// The velocity nodes that belong to this part.
+    pub fn own_velocity_nodes(&self) -> Range<usize> {
+        self.partition().map_or(0..self.velocity.node_count(), |part| part.velocity.owned.clone())
+    }
+
     /// Pseudo-random numbers at the own pressures, for any number of ranks those of one; zero at others.
     pub fn pseudo_random_pressures(&self) -> Vec<f32> {
         let mut numbers = vec![0.0; self.pressure.node_count()];

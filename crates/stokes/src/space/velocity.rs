@@ -208,6 +208,11 @@ impl<const D: usize> VelocitySpace<D> {
         self.nodes().node_count() * D
     }
 
+    /// Radius of a body.
+    pub fn radius(&self, body: usize) -> f64 {
+        self.radius[body]
+    }
+
     /// The body a node moves with.
     pub fn body_of(&self, node: usize) -> Option<u32> {
         Some(self.body_of[node]).filter(|&body| body != NO_BODY)

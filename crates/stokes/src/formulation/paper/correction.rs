@@ -24,7 +24,7 @@ use crate::error::StokesError;
 use crate::operator::{CountedOperator, Elements, acting, add_at, assemble_viscous_on, gather};
 use crate::precondition::assembly::assemble_on_nodes;
 use crate::precondition::numbered::NumberedNodes;
-use crate::precondition::{Correction, CycleLevels};
+use crate::precondition::{Correction, CycleLevels, Ties};
 use crate::space::{Discretisation, VelocitySpace, around_finest_cells, moves_as_one, nodes_of_cells_with};
 
 /// Where the solid is less stiff a sweep around films saves no iterations, see
@@ -141,7 +141,13 @@ impl<const D: usize> PenalisedCorrection<D> {
 }
 
 impl<const D: usize> Correction for PenalisedCorrection<D> {
-    fn apply(&mut self, r: &[f64], z: &mut [f64], levels: &mut dyn FnMut(&mut [f64], &mut [f32])) {
+    fn apply(
+        &mut self,
+        r: &[f64],
+        z: &mut [f64],
+        levels: &mut dyn FnMut(&mut [f64], &mut [f32]),
+        _: Option<Ties<'_>>,
+    ) {
         z.fill(0.0);
         match &mut self.film {
             Some(film) => {

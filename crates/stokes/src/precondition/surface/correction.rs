@@ -5,6 +5,12 @@
 //! smoother, the levels `V` and Chebyshev's sweep `C`:
 //!
 //! `z = G r`, `z += V (r - A z)`, `z += G (r - A z)`, `z += C (r - A z)`.
+//!
+//! The levels move what is inside a body with it. Small bodies have blocks for what is left of that, whose
+//! corrections are added to those of the levels.
+//!
+//! Films tie the motions of bodies to each other. They change what the levels do to the bodies, and their
+//! forces join the residual: so the smoothers after the levels see both, and the fluid follows.
 
 use gluey_linalg::vector;
 use gluey_parallel::Halo;
@@ -12,7 +18,7 @@ use gluey_parallel::Halo;
 use super::smoother::SurfaceSmoother;
 use crate::error::StokesError;
 use crate::operator::Elements;
-use crate::precondition::Correction;
+use crate::precondition::{Correction, Ties};
 use crate::space::{VelocitySpace, norm};
 use crate::surface::SurfaceCoupling;
 
@@ -44,7 +50,7 @@ impl<const D: usize> SurfaceCorrection<D> {
         surfaces: &SurfaceCoupling<D>,
         rigid: &VelocitySpace<D>,
     ) -> Result<Self, StokesError> {
-        let (smoother, space) = (SurfaceSmoother::new(elements, surfaces)?, &elements.system().space);
+        let (smoother, space) = (SurfaceSmoother::new(elements, surfaces, rigid)?, &elements.system().space);
         let dim = space.dim();
         let [x, r, velocity] = [(); 3].map(|()| vec![0.0; dim]);
         Ok(Self {
@@ -61,8 +67,9 @@ impl<const D: usize> SurfaceCorrection<D> {
         })
     }
 
-    /// `z = V r`, `x += z`, `r -= A z` for the residual in the workspace.
-    fn correct(&mut self, levels: &mut dyn FnMut(&mut [f64], &mut [f32])) {
+    /// `z = V r`, with what is inside small bodies, `x += z`, `r -= A z` for the residual in the workspace,
+    /// over `norm`.
+    fn correct(&mut self, levels: &mut dyn FnMut(&mut [f64], &mut [f32]), ties: Option<Ties<'_>>, norm: f64) {
         let nodal = self.rigid.full_dim();
         vector::convert(1.0, &self.r, &mut self.load);
         self.halo.update(&mut self.load);
@@ -74,20 +81,47 @@ impl<const D: usize> SurfaceCorrection<D> {
             *load += spread;
         }
         levels(&mut self.load, &mut self.velocity);
+        if let Some(ties) = ties {
+            self.tie(ties, norm);
+        }
         self.correction[nodal..].copy_from_slice(&self.velocity[nodal..]);
         self.rigid.expand(&mut self.velocity);
         let fields = self.correction.chunks_exact_mut(D).zip(self.velocity.chunks_exact(D));
         for ((z, u), _) in fields.zip(&self.is_free).filter(|(_, is_free)| **is_free) {
             z.copy_from_slice(u);
         }
+        self.smoother.add_inside(&self.r, &mut self.correction);
         self.smoother.update(&mut self.correction);
         vector::axpy(1.0, &self.correction, &mut self.x);
         self.smoother.subtract(&self.correction, &mut self.r);
     }
+
+    /// Ties the motions of the bodies, of which `x` and the levels' velocities are the sums, and subtracts
+    /// the loads of that from the residual.
+    fn tie(&mut self, ties: Ties<'_>, norm: f64) {
+        let nodal = self.rigid.full_dim();
+        let Self { x, r, velocity, halo, spread, load, .. } = self;
+        let [twists, loads] = [spread, load].map(|wide| &mut wide[nodal..]);
+        let (x, velocities) = (&x[nodal..], &mut velocity[nodal..]);
+        let sums = x.iter().zip(&*velocities).map(|(x, v)| norm * (f64::from(*x) + f64::from(*v)));
+        twists.iter_mut().zip(sums).for_each(|(twist, sum)| *twist = sum);
+        ties(twists, loads);
+        for ((v, twist), x) in velocities.iter_mut().zip(&*twists).zip(x) {
+            *v = (twist / norm - f64::from(*x)) as f32;
+        }
+        r[nodal..].iter_mut().zip(&*loads).for_each(|(r, load)| *r -= (load / norm) as f32);
+        halo.update(velocity);
+    }
 }
 
 impl<const D: usize> Correction for SurfaceCorrection<D> {
-    fn apply(&mut self, r: &[f64], z: &mut [f64], levels: &mut dyn FnMut(&mut [f64], &mut [f32])) {
+    fn apply(
+        &mut self,
+        r: &[f64],
+        z: &mut [f64],
+        levels: &mut dyn FnMut(&mut [f64], &mut [f32]),
+        ties: Option<Ties<'_>>,
+    ) {
         let norm = norm(self.smoother.halo(), r);
         if norm == 0.0 {
             return z.fill(0.0);
@@ -95,7 +129,7 @@ impl<const D: usize> Correction for SurfaceCorrection<D> {
         vector::convert(1.0 / norm, r, &mut self.r);
         self.x.fill(0.0);
         self.smoother.add_blocks(&mut self.r, &mut self.x);
-        self.correct(levels);
+        self.correct(levels, ties, norm);
         self.smoother.add_blocks(&mut self.r, &mut self.x);
         self.smoother.sweep(&self.r, &mut self.x);
         vector::convert(norm, &self.x, z);

@@ -9,7 +9,7 @@
 use gluey_fem::ReferenceMatrices;
 use gluey_geom::Dim;
 use gluey_linalg::{
-    Chebyshev, Guess, LinOp, PatchError, Preconditioner, SchwarzPatches, SpectralInterval, WeakModes,
+    Chebyshev, Guess, Jagged, LinOp, PatchError, Preconditioner, SchwarzPatches, SpectralInterval, WeakModes,
     estimate_lambda_max_from, invert_spd, vector,
 };
 use gluey_parallel::Halo;
@@ -21,7 +21,7 @@ use crate::operator::{
 use crate::precondition::assembly::assemble_on_nodes;
 use crate::precondition::numbered::NumberedNodes;
 use crate::precondition::velocity::cell_lambda_max;
-use crate::space::{Discretisation, around_finest_cells};
+use crate::space::{Discretisation, VelocitySpace, around_finest_cells};
 use crate::surface::SurfaceCoupling;
 
 use super::roots::{ModesError, modes_and_diagonal};
@@ -30,6 +30,9 @@ use super::roots::{ModesError, modes_and_diagonal};
 /// in the fluid over this.
 const DEGREES: [usize; 2] = [3, 4];
 const RATIOS: [f64; 2] = [5.0, 8.0];
+/// Spheres with a smaller radius, in cells, have a block for what is inside: some 120 nodes at most. Discs
+/// have none.
+const RADIUS_OF_BLOCKS: f64 = 1.5;
 /// Lanczos steps for the largest eigenvalue, which depends on the cuts, and the factor on what they find.
 const LANCZOS_STEPS: usize = 8;
 const SAFETY: f64 = 1.1;
@@ -52,6 +55,8 @@ pub struct SurfaceSmoother<const D: usize> {
 /// Restricted additive Schwarz on the free nodes of the own roots.
 struct RootBlocks<const D: usize> {
     inverses: Inverses<D>,
+    /// Blocks inside small bodies, where there are any.
+    inside: Option<WeakModes<D>>,
     /// The components of the nodes among the reduced velocities.
     positions: Vec<u32>,
     /// In a part, which share of its blocks a component has here.
@@ -69,14 +74,18 @@ enum Inverses<const D: usize> {
 }
 
 impl<const D: usize> SurfaceSmoother<D> {
-    /// The smoothers of a system with cut cells. Vectors that they are applied to hold the same at ghosts as
-    /// at their owners. All ranks call this.
+    /// The smoothers of a system with cut cells, on levels of which the finest has the velocities `rigid`.
+    /// Vectors that they are applied to hold the same at ghosts as at their owners. All ranks call this.
     ///
     /// # Errors
     /// If a block or an entry of the diagonal is not positive, on all ranks.
-    pub fn new(elements: &Elements<'_, D>, surfaces: &SurfaceCoupling<D>) -> Result<Self, StokesError> {
+    pub fn new(
+        elements: &Elements<'_, D>,
+        surfaces: &SurfaceCoupling<D>,
+        rigid: &VelocitySpace<D>,
+    ) -> Result<Self, StokesError> {
         let discretisation = elements.system().discretisation();
-        let assembled = discretisation.agreed(Self::assembled(elements, surfaces))?;
+        let assembled = discretisation.agreed(Self::assembled(elements, surfaces, rigid))?;
         discretisation.agreed(assembled.completed(elements))
     }
 
@@ -87,6 +96,7 @@ impl<const D: usize> SurfaceSmoother<D> {
     fn assembled(
         elements: &Elements<'_, D>,
         surfaces: &SurfaceCoupling<D>,
+        rigid: &VelocitySpace<D>,
     ) -> Result<AssembledSmoother<D>, StokesError> {
         let system = elements.system();
         let near = near_surfaces(elements, surfaces);
@@ -97,7 +107,7 @@ impl<const D: usize> SurfaceSmoother<D> {
         if let Some(here) = &here {
             smoothed.iter_mut().zip(here).for_each(|(smoothed, here)| *smoothed &= here);
         }
-        let (blocks, near_surfaces) = RootBlocks::new(&nodes, elements, surfaces)?;
+        let (blocks, near_surfaces) = RootBlocks::new(&nodes, elements, surfaces, rigid)?;
         let nodal = nodal(elements, &smoothed, &blocks.positions, &near_surfaces)?;
         smoothed.iter_mut().zip(&near).for_each(|(smoothed, near)| *smoothed |= near);
         let operator = ViscousOperator::new(system, &smoothed, &near);
@@ -161,6 +171,11 @@ impl<const D: usize> SurfaceSmoother<D> {
         self.operator.apply_near(&self.velocity, &mut self.load);
         self.halo.sum(&mut self.load);
         vector::axpy(-1.0, &self.load, r);
+    }
+
+    /// `z += G r` by the blocks inside bodies.
+    pub fn add_inside(&mut self, r: &[f32], z: &mut [f32]) {
+        self.blocks.add_inside(r, z);
     }
 
     /// Chebyshev's sweep on `A x = b` from an `x` with the residual `r`.
@@ -237,7 +252,7 @@ fn near_surfaces<const D: usize>(elements: &Elements<'_, D>, surfaces: &SurfaceC
 impl<const D: usize> RootBlocks<D> {
     /// `z += G r`.
     fn add(&mut self, r: &[f32], z: &mut [f32]) {
-        let Self { inverses, positions, shares, r: local, z: correction } = self;
+        let Self { inverses, positions, shares, r: local, z: correction, .. } = self;
         gather(positions, r, local);
         match inverses {
             Inverses::Whole(patches) => patches.apply(local, correction),
@@ -249,11 +264,20 @@ impl<const D: usize> RootBlocks<D> {
         add_at(positions, correction, z);
     }
 
+    /// `z += G r` for the blocks inside bodies.
+    fn add_inside(&mut self, r: &[f32], z: &mut [f32]) {
+        let Self { inside: Some(inside), positions, r: local, z: correction, .. } = self else { return };
+        gather(positions, r, local);
+        inside.apply(local, correction);
+        add_at(positions, correction, z);
+    }
+
     /// The blocks, and the diagonal at their nodes.
     fn new(
         nodes: &NumberedNodes<'_, D>,
         elements: &Elements<'_, D>,
         surfaces: &SurfaceCoupling<D>,
+        rigid: &VelocitySpace<D>,
     ) -> Result<(Self, Vec<f64>), StokesError> {
         let number = |&node: &u32| nodes.nodes.number(node as usize).map(|number| number as u32);
         let block = |&root: &u32| -> Vec<u32> {
@@ -263,23 +287,34 @@ impl<const D: usize> RootBlocks<D> {
             block
         };
         let is_own = |root: &&u32| nodes.mesh.is_own(**root as usize);
-        let blocks = surfaces.roots().iter().filter(is_own).map(block);
+        let blocks: Jagged<u32> = surfaces.roots().iter().filter(is_own).map(block).collect();
+        let inside = inside_bodies(nodes, rigid, &blocks);
         let shares = nodes.mesh.is_part().then(|| shares::<D>(nodes, surfaces.roots(), block));
         let zeros = vec![0.0; nodes.nodes.len() * D];
         let (inverses, diagonal) = if D == 2 {
             let matrix = assemble_on_nodes(nodes, elements)?;
-            let patches = SchwarzPatches::restricted(&matrix, blocks, zeros.clone());
+            let patches =
+                SchwarzPatches::restricted(&matrix, blocks.iter().map(<[u32]>::to_vec), zeros.clone());
             (Inverses::Whole(patches.map_err(|error| at_root(surfaces, error))?), matrix.diagonal())
         } else {
-            let found = modes_and_diagonal(nodes, elements, blocks.collect());
+            let found = modes_and_diagonal(nodes, elements, blocks.clone());
             let (modes, diagonal) = found.map_err(|error| match error {
                 ModesError::Patch(error) => at_root(surfaces, error),
                 ModesError::Matrix(error) => error,
             })?;
             (Inverses::WeakModes(modes), diagonal)
         };
+        let root_of = |patch: usize| blocks.iter().position(|root| root.contains(&inside[patch][0]));
+        let found = (inside.len() > 0).then(|| modes_and_diagonal(nodes, elements, inside.clone()));
+        let found = found.transpose().map_err(|error| match error {
+            ModesError::Patch(PatchError { patch, source }) => {
+                at_root(surfaces, PatchError { patch: root_of(patch).unwrap_or_default(), source })
+            }
+            ModesError::Matrix(error) => error,
+        })?;
+        let inside = found.map(|(modes, _)| modes);
         let positions = nodes.positions();
-        Ok((Self { inverses, positions, shares, r: zeros.clone(), z: zeros }, diagonal))
+        Ok((Self { inverses, inside, positions, shares, r: zeros.clone(), z: zeros }, diagonal))
     }
 }
 
@@ -299,6 +334,31 @@ fn shares<const D: usize>(
     }
     let share = |(&own, &all): (&u32, &u32)| own as f32 / all.max(1) as f32;
     own.iter().zip(&all).map(share).flat_map(|share| [share; D]).collect()
+}
+
+/// The own nodes of own roots that the levels take for parts of a body, body by body, of small bodies.
+///
+/// The levels move such nodes with the body. Cells much smaller than the body have no fluid there, and their
+/// nodes are no unknowns; cells as large as it all have some, however little, and a velocity in the middle of
+/// the body alone has hardly any energy: less than any block of a single cell tells.
+fn inside_bodies<const D: usize>(
+    nodes: &NumberedNodes<'_, D>,
+    rigid: &VelocitySpace<D>,
+    of_roots: &Jagged<u32>,
+) -> Jagged<u32> {
+    let mut is_in_root = vec![false; nodes.nodes.len()];
+    of_roots.items().iter().for_each(|&node| is_in_root[node as usize] = true);
+    let own = nodes.mesh.own_velocity_nodes();
+    let numbered = nodes.nodes.positions().iter().zip(0u32..);
+    let in_roots =
+        numbered.filter(|&(&n, number)| own.contains(&(n as usize)) && is_in_root[number as usize]);
+    let largest = RADIUS_OF_BLOCKS * nodes.mesh.finest_cell_size();
+    let is_small = |body: &u32| D == 3 && rigid.radius(*body as usize) < largest;
+    let pairs = in_roots.filter_map(|(&node, number)| {
+        rigid.body_of(node as usize).filter(is_small).map(|body| (body as usize, number))
+    });
+    let of_bodies = Jagged::grouped(rigid.body_count(), pairs);
+    of_bodies.iter().filter(|nodes| !nodes.is_empty()).map(<[u32]>::to_vec).collect()
 }
 
 /// The error of the block of a root.

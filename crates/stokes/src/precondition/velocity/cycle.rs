@@ -7,7 +7,7 @@ use super::coarse::CoarseSolver;
 use super::hierarchy::Hierarchy;
 use super::level::{Level, Smoothing};
 use crate::error::StokesError;
-use crate::precondition::Correction;
+use crate::precondition::{Correction, Ties};
 use crate::space::{VelocitySpace, norm};
 
 /// A level that a cycle is to have.
@@ -112,13 +112,14 @@ impl<const D: usize> VCycle<D> {
     }
 
     /// `z = V (r - g)` for the gradient `g` that `gradient` writes, in vectors with this halo that are zero
-    /// at ghosts.
+    /// at ghosts. `ties` as in [`Correction::apply`].
     pub fn answer<S: Scalar>(
         &mut self,
         r: &[S],
         gradient: impl FnOnce(&mut [f32]),
         z: &mut [S],
         halo: &mut Halo,
+        ties: Option<Ties<'_>>,
     ) {
         let top = self.levels.len() - 1;
         gradient(&mut self.levels[top].b[..r.len()]);
@@ -133,7 +134,7 @@ impl<const D: usize> VCycle<D> {
         halo.accumulate(&mut load);
         vector::residual_from_product(r, &mut load);
         halo.update(&mut load);
-        correction.apply(&load, &mut answer, &mut |f, u| self.rigid_velocities(f, u));
+        correction.apply(&load, &mut answer, &mut |f, u| self.rigid_velocities(f, u), ties);
         halo.clear(&mut answer);
         vector::convert(1.0, &answer, z);
         self.wide = [load, answer];
@@ -144,7 +145,7 @@ impl<const D: usize> VCycle<D> {
 impl<const D: usize> Preconditioner<f64> for VCycle<D> {
     fn apply(&mut self, r: &[f64], z: &mut [f64]) {
         let Some(mut correction) = self.correction.take() else { return self.rigid_cycle(r, z) };
-        correction.apply(r, z, &mut |f, u| self.rigid_velocities(f, u));
+        correction.apply(r, z, &mut |f, u| self.rigid_velocities(f, u), None);
         self.correction = Some(correction);
     }
 }
