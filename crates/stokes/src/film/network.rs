@@ -240,8 +240,8 @@ impl FilmCorrection<'_> {
         self.all = all;
     }
 
-    /// Writes the loads `s B^T g` on the bodies that vectors here have of forces `g` of own films, told by the
-    /// number of their row. All ranks call this.
+    /// Writes the loads `s B^T g` on the bodies that vectors here have, of the forces `g` of own films by the
+    /// numbers of their rows. All ranks call this.
     pub fn loads(&mut self, g: impl Fn(usize) -> f64, loads: &mut [f64]) {
         let Self { network, load, .. } = self;
         network.add_up(network.rows.iter().map(|row| g(row.row as usize)), load);

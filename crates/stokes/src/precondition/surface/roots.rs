@@ -2,8 +2,7 @@
 //! another: the matrix on all nodes near surfaces would take more memory than everything else.
 
 use gluey_linalg::{
-    BlockGroups, Jagged, LocalTerm, ModesWorkspace, PatchError, Pattern, SymmetricBlockMatrix, WeakModes,
-    weak_modes,
+    BlockGroups, Jagged, LocalTerm, ModesWorkspace, PatchError, Pattern, SymmetricBlockMatrix, weak_modes,
 };
 use rayon::prelude::*;
 
@@ -43,18 +42,18 @@ pub enum ModesError {
     Matrix(StokesError),
 }
 
-/// The weak modes on `patches`, ascending numbers of nodes, and the diagonal at all numbered nodes.
+/// The weak modes of each of `patches`, ascending numbers of nodes, and the diagonal at all numbered nodes.
 pub fn modes_and_diagonal<const D: usize>(
     nodes: &NumberedNodes<'_, D>,
     elements: &Elements<'_, D>,
-    patches: Jagged<u32>,
-) -> Result<(WeakModes<D>, Vec<f64>), ModesError> {
+    patches: &Jagged<u32>,
+) -> Result<(Vec<Vec<f32>>, Vec<f64>), ModesError> {
     let contributions = Contributions::new(nodes, elements);
-    let batches = batches(&patches, nodes.nodes.len());
+    let batches = batches(patches, nodes.nodes.len());
     let workspace = || vec![u32::MAX; nodes.nodes.len()];
     let found: Vec<Result<_, ModesError>> = batches
         .par_iter()
-        .map_init(workspace, |place, batch| contributions.of_batch(batch, &patches, place))
+        .map_init(workspace, |place, batch| contributions.of_batch(batch, patches, place))
         .collect();
     // The first error, whichever thread was the first to find one.
     let found: Vec<(Vec<Vec<f32>>, Vec<f64>)> = found.into_iter().collect::<Result<_, _>>()?;
@@ -64,8 +63,7 @@ pub fn modes_and_diagonal<const D: usize>(
             diagonal[node as usize * D..][..D].copy_from_slice(own);
         }
     }
-    let modes = found.iter().flat_map(|(modes, _)| modes);
-    Ok((WeakModes::from_modes(patches, modes, &diagonal), diagonal))
+    Ok((found.into_iter().flat_map(|(modes, _)| modes).collect(), diagonal))
 }
 
 /// Batches of all patches, and of the nodes in none.

@@ -288,31 +288,27 @@ impl<const D: usize> RootBlocks<D> {
         };
         let is_own = |root: &&u32| nodes.mesh.is_own(**root as usize);
         let blocks: Jagged<u32> = surfaces.roots().iter().filter(is_own).map(block).collect();
-        let inside = inside_bodies(nodes, rigid, &blocks);
         let shares = nodes.mesh.is_part().then(|| shares::<D>(nodes, surfaces.roots(), block));
         let zeros = vec![0.0; nodes.nodes.len() * D];
-        let (inverses, diagonal) = if D == 2 {
+        let (inverses, inside, diagonal) = if D == 2 {
             let matrix = assemble_on_nodes(nodes, elements)?;
-            let patches =
-                SchwarzPatches::restricted(&matrix, blocks.iter().map(<[u32]>::to_vec), zeros.clone());
-            (Inverses::Whole(patches.map_err(|error| at_root(surfaces, error))?), matrix.diagonal())
+            let lists = blocks.iter().map(<[u32]>::to_vec);
+            let patches = SchwarzPatches::restricted(&matrix, lists, zeros.clone());
+            let patches = patches.map_err(|error| at_root(surfaces, &blocks, error))?;
+            (Inverses::Whole(patches), None, matrix.diagonal())
         } else {
-            let found = modes_and_diagonal(nodes, elements, blocks.clone());
+            let inside = inside_bodies(nodes, rigid, &blocks);
+            let all: Jagged<u32> = blocks.iter().chain(inside.iter()).map(<[u32]>::to_vec).collect();
+            let found = modes_and_diagonal(nodes, elements, &all);
             let (modes, diagonal) = found.map_err(|error| match error {
-                ModesError::Patch(error) => at_root(surfaces, error),
+                ModesError::Patch(error) => at_root(surfaces, &all, error),
                 ModesError::Matrix(error) => error,
             })?;
-            (Inverses::WeakModes(modes), diagonal)
+            let (of_roots, of_inside) = modes.split_at(blocks.len());
+            let weak = |patches, modes: &[Vec<f32>]| WeakModes::from_modes(patches, modes.iter(), &diagonal);
+            let inside = (inside.len() > 0).then(|| weak(inside, of_inside));
+            (Inverses::WeakModes(weak(blocks, of_roots)), inside, diagonal)
         };
-        let root_of = |patch: usize| blocks.iter().position(|root| root.contains(&inside[patch][0]));
-        let found = (inside.len() > 0).then(|| modes_and_diagonal(nodes, elements, inside.clone()));
-        let found = found.transpose().map_err(|error| match error {
-            ModesError::Patch(PatchError { patch, source }) => {
-                at_root(surfaces, PatchError { patch: root_of(patch).unwrap_or_default(), source })
-            }
-            ModesError::Matrix(error) => error,
-        })?;
-        let inside = found.map(|(modes, _)| modes);
         let positions = nodes.positions();
         Ok((Self { inverses, inside, positions, shares, r: zeros.clone(), z: zeros }, diagonal))
     }
@@ -353,7 +349,7 @@ fn inside_bodies<const D: usize>(
     let in_roots =
         numbered.filter(|&(&n, number)| own.contains(&(n as usize)) && is_in_root[number as usize]);
     let largest = RADIUS_OF_BLOCKS * nodes.mesh.finest_cell_size();
-    let is_small = |body: &u32| D == 3 && rigid.radius(*body as usize) < largest;
+    let is_small = |body: &u32| rigid.radius(*body as usize) < largest;
     let pairs = in_roots.filter_map(|(&node, number)| {
         rigid.body_of(node as usize).filter(is_small).map(|body| (body as usize, number))
     });
@@ -361,12 +357,19 @@ fn inside_bodies<const D: usize>(
     of_bodies.iter().filter(|nodes| !nodes.is_empty()).map(<[u32]>::to_vec).collect()
 }
 
-/// The error of the block of a root.
-fn at_root<const D: usize>(surfaces: &SurfaceCoupling<D>, error: PatchError) -> StokesError {
+/// The error of a block: of a root, or of what is inside a body, at the first root that has a node of it.
+fn at_root<const D: usize>(
+    surfaces: &SurfaceCoupling<D>,
+    blocks: &Jagged<u32>,
+    error: PatchError,
+) -> StokesError {
     let PatchError { patch, source } = error;
     let (discretisation, roots) = (surfaces.discretisation(), surfaces.roots());
-    let mut own = (0..roots.len()).filter(|&place| discretisation.is_own(roots[place] as usize));
-    let place = own.nth(patch).unwrap_or_default();
+    let own = (0..roots.len()).filter(|&place| discretisation.is_own(roots[place] as usize));
+    let own: Vec<usize> = own.collect();
+    let has_it = |block: &[u32]| block.contains(&blocks[patch][0]);
+    let first = || blocks.iter().position(has_it).unwrap_or_default();
+    let place = own.get(patch).copied().unwrap_or_else(|| own[first()]);
     let root = roots[place] as usize;
     let (mesh, half) = (&discretisation.mesh, 0.5 * discretisation.cell_size(root));
     let center = mesh.lower_corner(&mesh.cells()[root]).iter().map(|x| x + half).collect();
