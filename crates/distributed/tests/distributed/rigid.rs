@@ -131,7 +131,7 @@ fn ranks_move_bodies_as_the_serial_solver_does<const D: usize>(example: Example<
             parts[0].flow.iteration_count
         );
         assert!(difference < 4.2e-10, "{size} ranks: velocities {difference:e}");
-        assert!(motion < 3.3e-9, "{size} ranks: bodies {motion:e}");
+        assert!(motion < 1.4e-9, "{size} ranks: bodies {motion:e}");
         let is_close =
             |part: &LocalFlow<D>| part.flow.iteration_count.abs_diff(alone.flow.iteration_count) <= 1;
         assert!(

@@ -10,7 +10,8 @@
 //! corrections are added to those of the levels.
 //!
 //! Films tie the motions of bodies to each other. They change what the levels do to the bodies, and their
-//! forces join the residual: so the smoothers after the levels see both, and the fluid follows.
+//! forces join the residual: so the smoothers after the levels see both, and the fluid follows. In 2D this
+//! saves nothing where discs touch, and they are left to the correction after the cycle.
 
 use gluey_linalg::vector;
 use gluey_parallel::Halo;
@@ -81,7 +82,9 @@ impl<const D: usize> SurfaceCorrection<D> {
             *load += spread;
         }
         levels(&mut self.load, &mut self.velocity);
-        if let Some(ties) = ties {
+        if D == 3
+            && let Some(ties) = ties
+        {
             self.tie(ties, norm);
         }
         self.correction[nodal..].copy_from_slice(&self.velocity[nodal..]);
