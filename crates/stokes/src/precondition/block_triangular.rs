@@ -10,8 +10,8 @@ use crate::precondition::schur::SchurInverse;
 use crate::precondition::velocity::VCycle;
 
 /// `z_p = -S^-1 r_p`, `z_u = V (r_u + B^T z_p)`; the forces of terms join the pressures. The films' rows of
-/// motions are made to hold ([`FilmCorrection`]) inside of the cycle, so that the fluid follows, and after
-/// it, so that no step opens them.
+/// motions are made to hold ([`FilmCorrection`]) inside of the cycle in 3D, so that the fluid follows, and
+/// after it, so that no step opens them.
 pub struct BlockTriangular<'a, const D: usize> {
     system: &'a StokesSystem<D>,
     forces: &'a mut PressureForces<D>,
