@@ -241,17 +241,53 @@ impl WithSimd for Multiply<'_> {
     type Output = ();
 
     #[inline(always)]
-    fn with_simd<S: Simd>(self, _: S) {
+    fn with_simd<S: Simd>(self, simd: S) {
         let Self { matrix, x, y } = self;
-        y.fill(0.0);
-        for i in 0..matrix.dim {
-            let row = matrix.row(i);
-            let own = x[i];
-            y[..i].iter_mut().zip(row).for_each(|(y, a)| *y += a * own);
-            let [sum] = sum_of_products(&row[..i], x[..i].as_chunks::<1>().0);
-            y[i] += sum + row[i] * own;
+        for first in (0..matrix.dim).step_by(GROUP) {
+            let ((before, own), (y, images)) = (x.split_at(first), y.split_at_mut(first));
+            let size = GROUP.min(own.len());
+            // Rows that a short group lacks count zero times.
+            let rows = std::array::from_fn(|k| &matrix.row((first + k).min(matrix.dim - 1))[..first]);
+            let factors = std::array::from_fn(|k| own.get(k).copied().unwrap_or(0.0));
+            let sums = multiply_rows(simd, rows, factors, before, y);
+            for (k, image) in images[..size].iter_mut().enumerate() {
+                let entry = |l: usize| matrix.row(first + k.max(l))[first + k.min(l)];
+                *image = sums[k] + (0..size).map(|l| entry(l) * own[l]).sum::<f64>();
+            }
         }
     }
+}
+
+/// `y += A^T factors` for the rows `A`, and `A x`.
+#[inline(always)]
+fn multiply_rows<S: Simd>(
+    simd: S,
+    rows: [&[f64]; GROUP],
+    factors: [f64; GROUP],
+    x: &[f64],
+    y: &mut [f64],
+) -> [f64; GROUP] {
+    let (x_full, x_rest) = S::as_simd_f64s(x);
+    let (y_full, y_rest) = S::as_mut_simd_f64s(y);
+    let [a, b, c, d] = rows.map(|row| S::as_simd_f64s(row).0.iter());
+    let [fa, fb, fc, fd] = factors.map(|factor| simd.splat_f64s(factor));
+    let mut sums = [simd.splat_f64s(0.0); GROUP];
+    for ((x, y), ((a, b), (c, d))) in x_full.iter().zip(y_full).zip(a.zip(b).zip(c.zip(d))) {
+        let first = simd.mul_add_e_f64s(fb, *b, simd.mul_add_e_f64s(fa, *a, *y));
+        *y = simd.mul_add_e_f64s(fd, *d, simd.mul_add_e_f64s(fc, *c, first));
+        for (sum, row) in sums.iter_mut().zip([a, b, c, d]) {
+            *sum = simd.mul_add_e_f64s(*row, *x, *sum);
+        }
+    }
+    let mut sums = sums.map(|sum| simd.reduce_sum_f64s(sum));
+    let full = x.len() - x_rest.len();
+    for (j, (x, y)) in (full..).zip(x_rest.iter().zip(y_rest)) {
+        for k in 0..GROUP {
+            *y += factors[k] * rows[k][j];
+            sums[k] += rows[k][j] * x;
+        }
+    }
+    sums
 }
 
 /// `sum_k a_k x_k`, in as many partial sums as fill vectors.
