@@ -40,6 +40,7 @@ impl<const D: usize> PairRepulsion<D> {
     ) -> Self {
         // Of the line through two velocities that is integrated over the step.
         let lengths = 2.0 * (step.velocity_weight / step.dt - 1.0);
+        // -1 in the step after a reversal, whose weight is `dt / 2`: there the force at its end counts alone.
         let alpha = 1.0 / (1.0 + lengths.max(0.0));
         let now = if gap < law.reach() { law.at::<D>(gap, radii) / rate } else { 0.0 };
         Self { law, radii, share: alpha / rate, known: (1.0 - alpha) * before - now, now }
