@@ -9,6 +9,11 @@ use gluey::{Case, OccupiedError, RecordOptions, ResultPaths, RunError, RunOption
 
 use crate::book::progress::Board;
 
+/// The longest step with which a viscosity with rough contacts is right to 1 % (`docs/studies.md`).
+pub const COARSE_STEP: f64 = 0.04;
+/// A tolerance of the flow that changes that viscosity by less than the step does.
+const COARSE_TOLERANCE: f64 = 1e-5;
+
 /// Minutes between checkpoints.
 const CHECKPOINT_MINUTES: f64 = 2.0;
 
@@ -58,6 +63,12 @@ impl StudyPoint {
     #[must_use]
     pub fn rough(self, friction: f64) -> Self {
         self.with("contact.strategy", "rough").with("contact.friction", format!("{friction:?}"))
+    }
+
+    /// The same with steps and flows that leave 1 % in a viscosity with rough contacts.
+    #[must_use]
+    pub fn coarsely(self) -> Self {
+        self.with("time.step", COARSE_STEP).with("flow.tolerance", COARSE_TOLERANCE)
     }
 
     /// The case.

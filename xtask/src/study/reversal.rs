@@ -3,7 +3,7 @@
 
 use super::drawing::{StudySeries, draw};
 use super::findings::{Findings, Study};
-use super::point::{Done, StudyPoint};
+use super::point::{COARSE_STEP, Done, StudyPoint};
 use super::steady::mean_of_runs;
 
 const FILE: &str = "friction.toml";
@@ -14,18 +14,18 @@ const FRACTIONS: [(f64, [&str; 2]); 2] =
 const MODELS: [(&str, Option<f64>); 3] =
     [("smooth", None), ("rough, friction 0", Some(0.0)), ("rough, friction 0.5", Some(0.5))];
 /// Configurations of each point, and where the shear is reversed and ends.
-const SEEDS: u32 = 4;
-const REVERSED_AT: f64 = 5.0;
-const END: f64 = 8.0;
-/// Strain before the reversal that is looked at, and that of a mean.
-const BEFORE: f64 = 1.0;
-const BIN: f64 = 0.1;
+const SEEDS: u32 = 3;
+const REVERSED_AT: f64 = 3.0;
+const END: f64 = 5.04;
+/// Strain before the reversal that is looked at, and that of a mean: three steps.
+const BEFORE: f64 = 0.96;
+const BIN: f64 = 3.0 * COARSE_STEP;
 
 pub const STUDY: Study = Study {
     title: "Reversal of the shear",
-    text: "A hundred equal spheres at fractions of 0.4 and 0.45 in a box that is sheared to a strain of five, from configurations of equilibrium \
+    text: "A hundred equal spheres at fractions of 0.4 and 0.45 in a box that is sheared to a strain of three, from configurations of equilibrium \
            without contacts, and then the other way: relative viscosity, and the share of contacts in it, against the strain after the reversal, in means over a \
-           strain of 0.1. Points are means of four configurations with twice their standard error. Three models: smooth spheres, \
+           strain of 0.12, three steps. Points are means of three configurations with twice their standard error. Three models: smooth spheres, \
            between which only the flow acts, films of lubrication included, and rough ones, of the roughness 0.005 radii, with friction 0 and 0.5. \
            Stokes flow is reversible: smooth spheres go back where they came from, and their viscosity is the same before and after, as in a mirror, but for \
            films that closed. Contacts open at the reversal, since they push and do not pull: the viscosity falls at once, and comes back when \
@@ -44,13 +44,14 @@ fn points(quick: bool) -> Vec<StudyPoint> {
                 let name = format!("{fraction}-{}-{seed}", model.replace(", ", "-").replace(' ', "-"));
                 let point = StudyPoint::new(name, model, fraction, FILE)
                     .with("name", "reversal")
+                    .coarsely()
                     .with("suspension.volume_fraction", fraction)
                     .with("suspension.seed", seed);
                 let point = match friction {
                     Some(friction) => point.rough(friction),
                     None => point.with("contact.strategy", "none"),
                 };
-                let [at, end] = if quick { [1.0, 1.6] } else { [REVERSED_AT, END] };
+                let [at, end] = if quick { [0.96, 1.56] } else { [REVERSED_AT, END] };
                 let point = point.with("time.reverse_at", at).with("time.end", end);
                 points.push(if quick { point.with("suspension.count", 12) } else { point });
             }

@@ -10,7 +10,7 @@ use super::point::{Done, StudyPoint};
 
 const FILES: [&str; 2] = ["reversibility-2d.toml", "reversibility-3d.toml"];
 /// Amplitudes of the strain in 2D and 3D.
-const AMPLITUDES: [&[f64]; 2] = [&[0.2, 0.4, 0.6, 1.0, 1.6], &[0.5, 1.0, 2.0]];
+const AMPLITUDES: [&[f64]; 2] = [&[0.2, 0.4, 0.6, 1.0, 1.6], &[0.5, 1.0]];
 /// Cycles in 2D and 3D.
 const CYCLES: [usize; 2] = [8, 4];
 /// A particle that is farther than this from where it was a cycle before, in radii, did not come back.

@@ -33,6 +33,7 @@ fn points(quick: bool) -> Vec<StudyPoint> {
     let point = |(name, model, rate, friction, load): (String, &'static str, f64, f64, f64)| {
         let point = StudyPoint::new(name, model, rate, FILE)
             .with("name", "thickening")
+            .coarsely()
             .with("suspension.volume_fraction", 0.5)
             .rough(friction)
             .with("contact.friction_load", format!("{load:?}"));
