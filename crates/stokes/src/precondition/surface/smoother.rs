@@ -306,7 +306,7 @@ impl<const D: usize> RootBlocks<D> {
             })?;
             let (of_roots, of_inside) = modes.split_at(blocks.len());
             let weak = |patches, modes: &[Vec<f32>]| WeakModes::from_modes(patches, modes.iter(), &diagonal);
-            let inside = (inside.len() > 0).then(|| weak(inside, of_inside));
+            let inside = (!inside.is_empty()).then(|| weak(inside, of_inside));
             (Inverses::WeakModes(weak(blocks, of_roots)), inside, diagonal)
         };
         let positions = nodes.positions();
