@@ -219,6 +219,12 @@ pub enum ContactError {
 }
 
 impl ContactError {
+    /// Whether contacts were looked for as they should be, and no forces were found: those of the same step
+    /// will not be found again.
+    pub fn is_unsolved(&self) -> bool {
+        matches!(self, Self::NotConverged { .. } | Self::FlowNotConverged { .. } | Self::GapNotClosed { .. })
+    }
+
     /// Refuses a pair of particles or walls that are not there.
     pub(crate) fn unless_known(pair: PairKey, count: usize, wall_count: usize) -> Result<(), Self> {
         let (first, second) = pair.particles();

@@ -10,7 +10,7 @@
 //! found together, for both follow from the gap. In a mobility with films between the pairs `d` is close to
 //! the inverse of `B M B^T`, so that steps are few; [`Anderson`]'s acceleration makes them fewer.
 
-use gluey_geom::{Twist, Vector, Wrench};
+use gluey_geom::{Matrix, Twist, Vector, Wrench};
 
 use super::params::FlowContactParams;
 use super::touch::Touch;
@@ -81,6 +81,14 @@ pub(super) struct PairMotion<const D: usize> {
     pub velocity: Vector<D>,
 }
 
+impl<const D: usize> PairMotion<D> {
+    /// Adds a velocity over a step in which it counts by `weight`.
+    pub fn add(&mut self, touch: &Touch<D>, velocity: &Vector<D>, weight: f64) {
+        self.velocity += velocity;
+        self.gap += touch.normal.dot(velocity) * weight;
+    }
+}
+
 /// Motions that forces make, and what pairs ask for then.
 pub(super) struct State<const D: usize> {
     /// Motions with the forces.
@@ -88,6 +96,15 @@ pub(super) struct State<const D: usize> {
     /// How pairs move.
     pub motions: Vec<PairMotion<D>>,
     /// The forces that pairs ask for.
+    pub asked: Vec<PairForce<D>>,
+    /// What these are beyond the forces, as numbers whose squares are powers.
+    pub change: Vec<f64>,
+    /// Size of the change, over that of the forces.
+    pub residual: f64,
+}
+
+/// Forces that pairs ask for.
+pub(super) struct Wish<const D: usize> {
     pub asked: Vec<PairForce<D>>,
     /// What these are beyond the forces, as numbers whose squares are powers.
     pub change: Vec<f64>,
@@ -104,7 +121,13 @@ impl<const D: usize> Coulomb<'_, D> {
             velocity: touch.velocity(&twists),
         };
         let motions: Vec<PairMotion<D>> = self.touches.iter().map(motion).collect();
-        let parts = self.touches.iter().zip(forces).zip(&motions);
+        let Wish { asked, change, residual } = self.wish(forces, &motions);
+        State { twists, motions, asked, change, residual }
+    }
+
+    /// What pairs ask for that have these forces and move like this.
+    pub fn wish(&self, forces: &[PairForce<D>], motions: &[PairMotion<D>]) -> Wish<D> {
+        let parts = self.touches.iter().zip(forces).zip(motions);
         let asked = parts.map(|((touch, force), motion)| self.asked(touch, force, touch.compliance, motion));
         let asked: Vec<PairForce<D>> = asked.collect();
         let changes: Vec<PairForce<D>> =
@@ -112,7 +135,7 @@ impl<const D: usize> Coulomb<'_, D> {
         let change = self.weighted(&changes);
         let (change_size, size) = (norm(&change), norm(&self.weighted(forces)));
         let residual = if change_size > 0.0 { change_size / size.max(f64::MIN_POSITIVE) } else { 0.0 };
-        State { twists, motions, asked, change, residual }
+        Wish { asked, change, residual }
     }
 
     /// Sets forces from the numbers of all, each within its cone.
@@ -175,6 +198,28 @@ impl<const D: usize> Coulomb<'_, D> {
         }
         let tangential = touch.across(&force.contact) - slip / across;
         PairForce { contact: self.admitted(touch, asked, tangential), excess }
+    }
+
+    /// How what a pair asks for changes with the velocities `v - d F`: along the normal, and across it.
+    /// Without repulsion.
+    pub fn slopes(&self, touch: &Touch<D>, force: &PairForce<D>, motion: &PairMotion<D>) -> [Matrix<D>; 2] {
+        let [along, across] = touch.compliance;
+        let normal = touch.normal;
+        let yielding = along * self.step.velocity_weight;
+        let pressing = normal.dot(&force.contact) - (motion.gap - touch.floor) / yielding;
+        let tangential = touch.across(&force.contact) - touch.across(&motion.velocity) / across;
+        let is_apart = pressing <= touch.least;
+        let (most, size) =
+            (self.params.friction.most(pressing.max(touch.least), self.rate), tangential.norm());
+        let plane = Matrix::identity() - normal * normal.transpose();
+        let along = if is_apart { Matrix::zeros() } else { normal * normal.transpose() };
+        if size <= most {
+            return [along, plane];
+        }
+        let direction = tangential / size;
+        let sticking = (plane - direction * direction.transpose()) * (most / size);
+        let growing = if is_apart || most == 0.0 { 0.0 } else { self.params.friction.coefficient };
+        [along + direction * normal.transpose() * growing, sticking]
     }
 
     /// The nearest force within the cone, its normal part first.

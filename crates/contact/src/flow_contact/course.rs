@@ -1,7 +1,8 @@
 //! How the iteration for the forces of contacts goes on from what pairs ask for.
 //!
 //! Anderson's acceleration of the steps takes 10 to 40 of them as a rule. Where a crowd jams, pairs stick and
-//! slip in turn, and it may not end. Sweeps over the pairs do, at the price of a block for each two of them.
+//! slip in turn, and it may not end. Sweeps over the pairs do, with Newton's method now and then, at the
+//! price of a block for each two of them.
 
 use super::anderson::Anderson;
 use super::coulomb::{Coulomb, PairForce, State};

@@ -16,6 +16,7 @@ mod anderson;
 mod coulomb;
 mod course;
 mod near;
+mod newton;
 mod pair_repulsion;
 mod params;
 mod solve;
@@ -348,8 +349,7 @@ impl<const D: usize> FlowForces<D> for FlowContact<D> {
                 ..*force
             })
         });
-        self.forces = turned.collect::<Result<_, ContactError>>()?;
-        Ok(())
+        turned.collect::<Result<_, ContactError>>().map(|forces| self.forces = forces)
     }
 
     fn is_reversible(&self) -> bool {

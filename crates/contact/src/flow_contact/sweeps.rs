@@ -1,9 +1,11 @@
 //! Sweeps over the pairs of a crowd, one after the other: block Gauss-Seidel on what the force of each does
-//! to the velocities of all (Moreau 1999, 10.1016/S0045-7825(98)00387-9; Jean 1999, the same issue).
+//! to the velocities of all (Moreau 1999, 10.1016/S0045-7825(98)00387-9; Jean 1999, the same issue). Now and
+//! then Newton's method goes on from where they are: there are solutions that sweeps come near to and leave.
 
 use gluey_geom::{Matrix, Vector};
 
 use super::coulomb::{Coulomb, PairForce, PairMotion};
+use super::newton;
 
 /// Sweeps between two looks at what the forces really do.
 const SWEEPS: usize = 20;
@@ -13,9 +15,11 @@ const MOST_PAIRS: usize = 4000;
 /// Velocities of all pairs under a force of each.
 pub(super) struct Sweeps<const D: usize> {
     /// Blocks of the Delassus operator: those of the force of a pair lie together.
-    blocks: Vec<Matrix<D>>,
+    pub(super) blocks: Vec<Matrix<D>>,
     /// What pairs yield among the others, along the normal and across it.
     compliance: Vec<[f64; 2]>,
+    /// Improvements so far.
+    count: usize,
 }
 
 impl<const D: usize> Sweeps<D> {
@@ -44,12 +48,12 @@ impl<const D: usize> Sweeps<D> {
             let (sum, squares) = (across.trace(), across.norm_squared());
             [along, 0.5 * (sum + (2.0 * squares - sum * sum).max(0.0).sqrt())]
         });
-        Some(Self { compliance: compliance.collect(), blocks })
+        Some(Self { compliance: compliance.collect(), blocks, count: 0 })
     }
 
     /// Better forces from `forces`, with which pairs move like this.
     pub fn improve(
-        &self,
+        &mut self,
         problem: &Coulomb<'_, D>,
         forces: &mut [PairForce<D>],
         mut motions: Vec<PairMotion<D>>,
@@ -62,11 +66,13 @@ impl<const D: usize> Sweeps<D> {
                 let change = asked.minus(&forces[k]).total(touch);
                 forces[k] = asked;
                 for ((motion, touch), block) in motions.iter_mut().zip(touches).zip(blocks) {
-                    let velocity = block * change;
-                    motion.velocity += velocity;
-                    motion.gap += touch.normal.dot(&velocity) * weight;
+                    motion.add(touch, &(block * change), weight);
                 }
             }
+        }
+        self.count += 1;
+        if self.count.is_power_of_two() {
+            newton::improve(problem, &self.blocks, forces, motions);
         }
     }
 }

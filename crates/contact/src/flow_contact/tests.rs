@@ -5,6 +5,7 @@ use std::f64::consts::PI;
 use gluey_geom::{Dim, Pose, Spin, Twist, Vector};
 
 use super::coulomb::{Coulomb, PairForce};
+use super::newton;
 use super::sweeps::Sweeps;
 use super::touch::Touch;
 use super::{FlowContact, FlowContactParams, Friction, NormalLaw};
@@ -227,10 +228,9 @@ fn repulsion_and_contact_share_a_push() {
     }
 }
 
-/// Eight spheres at the corners of a cube that a flow presses together and shears: sweeps from nothing end,
-/// at the motions of the accelerated iteration.
-#[test]
-fn sweeps_find_the_forces_of_the_acceleration() {
+/// Calls `check` with eight spheres at the corners of a cube that a flow presses together and shears, and the
+/// motions that the accelerated iteration finds.
+fn with_cube(check: impl FnOnce(Coulomb<'_, 3>, &[Twist<3>])) {
     let place = |k: usize| Vector::<3>::from_fn(|d, _| 2.01 * (k >> d & 1) as f64);
     let poses: Vec<Pose<3>> = (0..8).map(|k| Pose::at(place(k))).collect();
     let (radii, drift) = (vec![1.0; 8], vec![Twist::default(); 8]);
@@ -252,24 +252,76 @@ fn sweeps_find_the_forces_of_the_acceleration() {
     };
     let touches: Vec<Touch<3>> = contact.forces().iter().map(touch).collect();
     assert_eq!(touches.len(), 12);
-    let mut problem = Coulomb {
-        step: &step,
-        touches: &touches,
-        params: &params,
-        rate: 1.0,
-        mobility: &mut drag,
-        free: &free,
-    };
-    let sweeps = Sweeps::new(&mut problem).expect("few pairs");
-    let mut forces = vec![PairForce::of_contact(Vector::zeros()); touches.len()];
-    let mut residuals = Vec::new();
-    for _ in 0..20 {
+    let (rate, mobility) = (1.0, &mut drag);
+    check(
+        Coulomb { step: &step, touches: &touches, params: &params, rate, mobility, free: &free },
+        &accelerated,
+    );
+}
+
+/// Sweeps from nothing end, at the motions of the accelerated iteration.
+#[test]
+fn sweeps_find_the_forces_of_the_acceleration() {
+    with_cube(|mut problem, accelerated| {
+        let mut sweeps = Sweeps::new(&mut problem).expect("few pairs");
+        let mut forces = vec![PairForce::of_contact(Vector::zeros()); problem.touches.len()];
+        let mut residuals = Vec::new();
+        for _ in 0..20 {
+            let state = problem.state(&forces);
+            residuals.push(state.residual);
+            sweeps.improve(&problem, &mut forces, state.motions);
+        }
+        let last = problem.state(&forces);
+        assert!(last.residual < 1e-10, "{residuals:?}");
+        let off = last.twists.iter().zip(accelerated).map(|(a, b)| (*a - *b).velocity.amax());
+        assert!(off.fold(0.0, f64::max) < 1e-8);
+    });
+}
+
+/// What pairs ask for changes as its slopes say, whether they are apart, stick or slip; and Newton's method
+/// with these ends at once from forces near the solution, but for what is not linear in the gaps.
+#[test]
+fn slopes_are_those_of_what_pairs_ask_for() {
+    with_cube(|mut problem, _| {
+        let mut forces = vec![PairForce::of_contact(Vector::zeros()); problem.touches.len()];
+        let mut sweeps = Sweeps::new(&mut problem).expect("few pairs");
+        for _ in 0..20 {
+            let motions = problem.state(&forces).motions;
+            sweeps.improve(&problem, &mut forces, motions);
+        }
         let state = problem.state(&forces);
-        residuals.push(state.residual);
-        sweeps.improve(&problem, &mut forces, state.motions);
-    }
-    let last = problem.state(&forces);
-    assert!(last.residual < 1e-10, "{residuals:?}");
-    let off = last.twists.iter().zip(&accelerated).map(|(a, b)| (*a - *b).velocity.amax());
-    assert!(off.fold(0.0, f64::max) < 1e-8);
+        let mut near = forces.clone();
+        near.iter_mut().for_each(|force| force.contact *= 1.02);
+        let motions = problem.state(&near).motions;
+        newton::improve(&problem, &sweeps.blocks, &mut near, motions);
+        assert!(problem.state(&near).residual < 1e-5, "{:e}", problem.state(&near).residual);
+        let mut kinds = [0; 3];
+        for (k, touch) in problem.touches.iter().enumerate() {
+            let (mut force, mut motion) = (forces[k], state.motions[k]);
+            // As they are, stuck, and apart.
+            match k % 3 {
+                0 => {}
+                1 => {
+                    motion.velocity = touch.normal * touch.normal.dot(&motion.velocity);
+                    force.contact -= touch.across(&force.contact) * 0.5;
+                }
+                _ => motion.gap += 1.0,
+            }
+            let (change, velocity) =
+                (Vector::<3>::new(0.3, -0.7, 0.2) * force.contact.norm(), Vector::<3>::new(0.1, 0.4, -0.6));
+            let [along, across] = problem.slopes(touch, &force, &motion);
+            let [of_gap, of_slip] = touch.compliance;
+            let slope = (along + across) * change - (along / of_gap + across / of_slip) * velocity;
+            let before = problem.asked(touch, &force, touch.compliance, &motion).contact;
+            let size = 1e-6;
+            force.contact += change * size;
+            motion.add(touch, &(velocity * size), problem.step.velocity_weight);
+            let after = problem.asked(touch, &force, touch.compliance, &motion).contact;
+            let (found, scale) = ((after - before) / size, change.norm() + velocity.norm() / of_gap);
+            assert!((found - slope).norm() < 1e-4 * scale, "{k}: {found} {slope}");
+            let is_apart = before.norm() == 0.0;
+            kinds[if is_apart { 0 } else { usize::from(across.norm_squared() > 1.9) + 1 }] += 1;
+        }
+        assert!(kinds.iter().all(|&count| count > 0), "apart, slipping, stuck: {kinds:?}");
+    });
 }
