@@ -91,9 +91,7 @@ fn hint(error: &RunError, case: &Path) -> Option<String> {
         RunError::Interrupted(Ended { checkpoint: Some(checkpoint), .. }) => {
             format!("to go on: {}", go_on(checkpoint))
         }
-        RunError::Stopped { cause, .. } if matches!(**cause, RunError::Step(StepError::Film { .. })) => {
-            hint(cause, case)?
-        }
+        RunError::Stopped { cause, .. } if ends_there_again(cause) => hint(cause, case)?,
         RunError::Stopped { checkpoint, cause, .. } => {
             let cure = match &**cause {
                 RunError::Output(error) if is_full(error) => Some("make room on that disk".into()),
@@ -124,6 +122,7 @@ fn hint(error: &RunError, case: &Path) -> Option<String> {
             "write elsewhere with --out DIR, or replace those results with --force".into()
         }
         RunError::Step(StepError::Film { source, .. }) if !source.is_given() => FILM_HINT.into(),
+        RunError::Step(StepError::Contact { source, .. }) if source.is_unsolved() => CONTACT_HINT.into(),
         RunError::LeftBox { .. } => {
             "end the run earlier, or take a larger box; contact keeps particles from its walls \
                                      (y), not from open sides"
@@ -140,6 +139,20 @@ fn hint(error: &RunError, case: &Path) -> Option<String> {
         _ => return None,
     })
 }
+
+/// Whether a run that is resumed from its last step comes to the same end.
+fn ends_there_again(error: &RunError) -> bool {
+    match error {
+        RunError::Step(StepError::Film { .. }) => true,
+        RunError::Step(StepError::Contact { source, .. }) => source.is_unsolved(),
+        _ => false,
+    }
+}
+
+/// What to do where no forces of contacts are found, also in the smallest part of a step.
+const CONTACT_HINT: &str = "to go on from there would end there again: run the case anew with a smaller time.step or with more time.halvings, \
+     up to 20 (--set time.step=..., --force or --out DIR); where a dense crowd with friction jams, with less of it \
+     (contact.friction) or a smaller fraction";
 
 /// What to do where films cannot be kept open, also in the smallest part of a step: to resume is no help.
 const FILM_HINT: &str = "to go on from there would end there again: run the case anew with a smaller time.step or with more \
