@@ -1,11 +1,12 @@
 //! Tables of runs and of `gluey analyse`: what they say where there is nothing to say, means of the rheology,
 //! studies, and whether docs/files.md has every column.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::Path;
 
 use crate::program::{fails, told};
+use gluey::RunRecord;
 use gluey::table::NumberTable;
 use tempfile::TempDir;
 
@@ -199,6 +200,38 @@ fn rates_of_absurd_size_are_refused() {
         write(folder.path(), "w.toml", &under(2, &format!("shear_rate = {rate}")));
         fails(folder.path(), &["run", "w.toml"], &["shear_rate", "1e-100 to 1e100, or 0"]);
     }
+}
+
+/// Rough discs, some of them in contact: every mean of a report has its own columns in the table of a study.
+#[test]
+fn a_study_has_the_means_of_its_reports() {
+    let folder = TempDir::new().expect("a folder");
+    let case = "name = \"rough\"\ndimension = 2\ntime = { step = 0.05, end = 1.0 }\n\
+                domain = { boundary = \"sheared\" }\ncontact = { strategy = \"rough\", roughness = 0.04 }\n\
+                [suspension]\nvolume_fraction = 0.4\ncount = 12\nmin_gap = 0.05\n[flow.mesh]\ncells_per_radius = 1.0\n";
+    write(folder.path(), "rough.toml", case);
+    told(folder.path(), &["sweep", "rough.toml", "--set", "contact.friction=0.5"]);
+    let table = read(folder.path(), "sweep/sweep.csv");
+    let [names, cells] = [0, 1].map(|line| table.lines().nth(line).expect("a line").split(','));
+    let cell_of: BTreeMap<&str, &str> = names.zip(cells).collect();
+    let record =
+        RunRecord::read(&folder.path().join("sweep/contact.friction=0.5/rough-rough-unfitted-run.json"));
+    let report = record.expect("a record").report.expect("a report");
+    let means = serde_json::to_value(report.rheology.expect("means")).expect("JSON");
+    let means = means.as_object().expect("an object").iter().filter(|(_, mean)| mean.get("mean").is_some());
+    let mut found = 0;
+    for (name, mean) in means {
+        for (column, number) in
+            [(name.clone(), &mean["mean"]), (format!("{name}_half_width"), &mean["half_width"])]
+        {
+            let number = number.as_f64().expect("a number");
+            let cell: f64 = cell_of[&column[..]].parse().expect("a number");
+            assert!((cell - number).abs() <= 1e-6 * number.abs(), "{column}: {cell} for {number}");
+        }
+        found += 1;
+    }
+    assert_eq!(found, 8, "all but N2, which is there in 3D");
+    assert!(cell_of["N2"].is_empty() && cell_of["sticking_contacts"] != "0", "{table}");
 }
 
 /// Names of columns that stand in the first cells of the tables under a heading of docs/files.md.

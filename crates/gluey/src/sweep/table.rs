@@ -7,6 +7,7 @@ use serde::Serialize;
 use super::SweptKey;
 use crate::number_text::shown_to;
 use crate::report::RunReport;
+use crate::rheology::{Mean, RheologyMeans};
 
 /// The outcome of a point.
 #[derive(Clone, Debug, Serialize)]
@@ -29,7 +30,7 @@ pub struct PointResult {
 /// there was nothing to be counted.
 pub fn table(axes: &[SweptKey], results: &[PointResult]) -> Vec<Vec<String>> {
     let keys = axes.iter().map(|axis| axis.key.clone());
-    let numbers = numbers_of(None).into_iter().map(|(name, _)| name.to_owned());
+    let numbers = numbers_of(None).into_iter().map(|(name, _)| name);
     let head = keys.chain(["state".to_owned()]).chain(numbers).collect();
     let line = |result: &PointResult| {
         let values = axes.iter().map(|axis| result.values.get(&axis.key).cloned().unwrap_or_default());
@@ -39,12 +40,28 @@ pub fn table(axes: &[SweptKey], results: &[PointResult]) -> Vec<Vec<String>> {
     [head].into_iter().chain(results.iter().map(line)).collect()
 }
 
+/// A mean among those of a run.
+type MeanOf = fn(&RheologyMeans) -> Option<Mean>;
+
+/// Means of the rheology, by the columns they are of.
+const MEANS: [(&str, MeanOf); 9] = [
+    ("viscosity", |means| means.viscosity),
+    ("viscosity_by_dissipation", |means| means.viscosity_by_dissipation),
+    ("viscosity_of_contacts", |means| means.viscosity_of_contacts),
+    ("viscosity_of_friction", |means| means.viscosity_of_friction),
+    ("sticking_contacts", |means| means.sticking_contacts),
+    ("sliding_contacts", |means| means.sliding_contacts),
+    ("N1", |means| means.n1),
+    ("N2", |means| means.n2),
+    ("particle_pressure", |means| means.particle_pressure),
+];
+
 /// Names and numbers of a report; no numbers without one.
-fn numbers_of(report: Option<&RunReport>) -> Vec<(&'static str, String)> {
+fn numbers_of(report: Option<&RunReport>) -> Vec<(String, String)> {
     let text = |of: fn(&RunReport) -> String| report.map_or(String::new(), of);
     let shown = |value: Option<f64>| value.map_or(String::new(), |value| shown_to(value, 7));
     let number = |of: fn(&RunReport) -> Option<f64>| shown(report.and_then(of));
-    let mut cells = vec![
+    let cells = [
         ("steps", text(|report| report.steps.to_string())),
         ("wall_s", text(|report| format!("{:.3}", report.wall_s))),
         ("cells", text(|report| report.cells.to_string())),
@@ -58,25 +75,20 @@ fn numbers_of(report: Option<&RunReport>) -> Vec<(&'static str, String)> {
         ("strain_skipped", number(|report| Some(report.rheology.as_ref()?.strain_skipped))),
     ];
     let rheology = report.and_then(|report| report.rheology.as_ref());
-    let means = [
-        (["viscosity", "viscosity_half_width"], rheology.and_then(|means| means.viscosity)),
-        (["N1", "N1_half_width"], rheology.and_then(|means| means.n1)),
-        (["N2", "N2_half_width"], rheology.and_then(|means| means.n2)),
-        (
-            ["particle_pressure", "particle_pressure_half_width"],
-            rheology.and_then(|means| means.particle_pressure),
-        ),
-    ];
-    for ([name, name_of_width], mean) in means {
-        cells.push((name, shown(mean.map(|mean| mean.mean))));
-        cells.push((name_of_width, shown(mean.and_then(|mean| mean.half_width))));
-    }
-    let all = means.into_iter().filter_map(|(_, mean)| mean).map(|mean| mean.is_resolved);
+    let means = MEANS.map(|(name, of)| (name, rheology.and_then(of)));
+    let all = means.iter().filter_map(|(_, mean)| *mean).map(|mean| mean.is_resolved);
     let is_resolved = all.reduce(|all, one| all && one);
     let is_resolved = is_resolved.map_or(String::new(), |is| if is { "yes" } else { "no" }.to_owned());
     let count = |count: usize| (count > 0).then_some(count as f64);
-    cells.push(("blocks_independent", is_resolved));
-    cells.push(("halved_steps", shown(report.and_then(|report| count(report.tally.halved_steps)))));
-    cells.push(("closed_films", shown(report.and_then(|report| count(report.tally.closed_films)))));
-    cells
+    let ends = [
+        ("blocks_independent", is_resolved),
+        ("halved_steps", shown(report.and_then(|report| count(report.tally.halved_steps)))),
+        ("closed_films", shown(report.and_then(|report| count(report.tally.closed_films)))),
+    ];
+    let with_width = means.into_iter().flat_map(|(name, mean)| {
+        let width = shown(mean.and_then(|mean| mean.half_width));
+        [(name.to_owned(), shown(mean.map(|mean| mean.mean))), (format!("{name}_half_width"), width)]
+    });
+    let named = |(name, cell): (&str, String)| (name.to_owned(), cell);
+    cells.map(named).into_iter().chain(with_width).chain(ends.map(named)).collect()
 }
