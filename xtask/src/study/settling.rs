@@ -14,9 +14,9 @@ const MODEL: &str = "equilibrium";
 
 pub const STUDY: Study = Study {
     title: "Settling of spheres",
-    text: "Mean velocity of twenty equal spheres of equal weight in a periodic box without mean flow, at the first instant after they were \
+    text: "Mean velocity of a hundred equal spheres of equal weight in a periodic box without mean flow, at the first instant after they were \
            at rest in equilibrium, over that of a single sphere: mean of many configurations with twice its standard error. What a box \
-           of twenty lacks is added by the correction of Ladd 1990 (10.1063/1.458830). Beside it: the polynomial through published \
+           of a hundred lacks is added by the correction of Ladd 1990 (10.1063/1.458830). Beside it: the polynomial through published \
            simulations of the same, 1 &minus; 6.5464 &phi; (1 &minus; 3.348 &phi; + 7.426 &phi;&sup2; &minus; 10.034 &phi;&sup3; + 5.882 \
            &phi;&#8308;), dilute suspensions (Batchelor 1972, 1 &minus; 6.55 &phi;), and experiments, whose particles have long left \
            equilibrium (Richardson and Zaki 1954, (1 &minus; &phi;)<sup>4.65</sup>).",
@@ -26,7 +26,7 @@ pub const STUDY: Study = Study {
 
 fn points(quick: bool) -> Vec<StudyPoint> {
     let fractions = if quick { &[0.1, 0.3][..] } else { &[0.02, 0.05, 0.1, 0.15, 0.2, 0.3, 0.4][..] };
-    let seeds = if quick { 2 } else { 20 };
+    let seeds = if quick { 2 } else { 10 };
     let mut points = Vec::new();
     for &fraction in fractions {
         for seed in 1..=seeds {
@@ -66,8 +66,8 @@ fn findings(done: &[Done]) -> anyhow::Result<Findings> {
         corrected.push((phi, mean + lost, 2.0 * error));
     }
     let series = [
-        StudySeries { label: "20 spheres, corrected for the box".to_owned(), points: corrected },
-        StudySeries { label: "20 spheres in their box".to_owned(), points: in_box },
+        StudySeries { label: "100 spheres, corrected for the box".to_owned(), points: corrected },
+        StudySeries { label: "100 spheres in their box".to_owned(), points: in_box },
     ];
     let columns = "configurations,phi,in_box,corrected,standard_error,polynomial".to_owned();
     let drawing = draw(["volume fraction *φ*", "settling velocity"], [false; 2], &series, known());
