@@ -200,8 +200,8 @@ impl<const D: usize> Coulomb<'_, D> {
         PairForce { contact: self.admitted(touch, asked, tangential), excess }
     }
 
-    /// How what a pair asks for changes with the velocities `v - d F`: along the normal, and across it.
-    /// Without repulsion.
+    /// Slopes of what a pair asks for: the matrices `N` and `S` of `(N + S) dF - (N / d_n + S / d_t) dv`, its
+    /// change with the force and the velocity of the pair. Without repulsion.
     pub fn slopes(&self, touch: &Touch<D>, force: &PairForce<D>, motion: &PairMotion<D>) -> [Matrix<D>; 2] {
         let [along, across] = touch.compliance;
         let normal = touch.normal;
