@@ -12,7 +12,7 @@
 use gluey_geom::{Matrix, Vector};
 use nalgebra::{DMatrix, DVector};
 
-use super::coulomb::{Coulomb, PairForce, PairMotion};
+use super::coulomb::{Coulomb, PairForce, PairMotion, Wish};
 use super::touch::Touch;
 
 /// Pairs at most: a step takes a second for so many.
@@ -36,31 +36,30 @@ pub(super) fn improve<const D: usize>(
     if forces.len() > MOST_PAIRS || !problem.touches.iter().all(is_suited) {
         return;
     }
-    let mut now =
-        Iterate { residual: problem.wish(forces, &motions).residual, forces: forces.to_vec(), motions };
-    let wanted = now.residual / GAIN;
+    let mut now = Iterate { wish: problem.wish(forces, &motions), forces: forces.to_vec(), motions };
+    let wanted = now.wish.residual / GAIN;
     for _ in 0..STEPS {
         let Some(change) = step(problem, blocks, &now) else { break };
         let shares = (0..=HALVINGS).map(|k| 0.5f64.powi(k as i32));
         let mut tried = shares.map(|share| (share, now.moved(problem, blocks, &change, share)));
         let is_better =
-            |(share, next): &(f64, Iterate<D>)| next.residual < (1.0 - 0.1 * share) * now.residual;
+            |(share, next): &(f64, Iterate<D>)| next.wish.residual < (1.0 - 0.1 * share) * now.wish.residual;
         let Some((_, next)) = tried.find(is_better) else { break };
         now = next;
-        if now.residual <= problem.params.tolerance {
+        if now.wish.residual <= problem.params.tolerance {
             break;
         }
     }
-    if now.residual <= wanted {
+    if now.wish.residual <= wanted {
         forces.copy_from_slice(&now.forces);
     }
 }
 
-/// Forces, how pairs move with them, and how far these are from what they ask for.
+/// Forces, how pairs move with them, and what they ask for then.
 struct Iterate<const D: usize> {
     forces: Vec<PairForce<D>>,
     motions: Vec<PairMotion<D>>,
-    residual: f64,
+    wish: Wish<D>,
 }
 
 impl<const D: usize> Iterate<D> {
@@ -81,8 +80,8 @@ impl<const D: usize> Iterate<D> {
                 motion.add(touch, &(block * change * share), weight);
             }
         }
-        let residual = problem.wish(&forces, &motions).residual;
-        Self { forces, motions, residual }
+        let wish = problem.wish(&forces, &motions);
+        Self { forces, motions, wish }
     }
 }
 
@@ -94,7 +93,6 @@ fn step<const D: usize>(
 ) -> Option<Vec<Vector<D>>> {
     let count = now.forces.len();
     let (mut jacobian, mut load) = (DMatrix::zeros(D * count, D * count), DVector::zeros(D * count));
-    let asked = problem.wish(&now.forces, &now.motions).asked;
     for (k, touch) in problem.touches.iter().enumerate() {
         let [normal, sticking] = problem.slopes(touch, &now.forces[k], &now.motions[k]);
         let [along, across] = touch.compliance;
@@ -105,7 +103,7 @@ fn step<const D: usize>(
         }
         let mut own = jacobian.view_mut((D * k, D * k), (D, D));
         own += Matrix::<D>::identity() - normal - sticking;
-        load.rows_mut(D * k, D).copy_from(&(asked[k].contact - now.forces[k].contact));
+        load.rows_mut(D * k, D).copy_from(&(now.wish.asked[k].contact - now.forces[k].contact));
     }
     let change = jacobian.lu().solve(&load)?;
     change
