@@ -130,8 +130,11 @@ fn studies_tell_viscosities_and_how_far_they_are() {
     let key = "suspension.volume_fraction";
     told(folder.path(), &["sweep", "s.toml", "--set", &format!("{key}=0.05,0.1,0.15,0.2"), "--out", "study"]);
     let text = read(folder.path(), "study/sweep.csv");
-    let names =
-        "N1,N1_half_width,N2,N2_half_width,particle_pressure,particle_pressure_half_width,blocks_independent";
+    let names = "strain_skipped,viscosity,viscosity_half_width,viscosity_by_dissipation,\
+                 viscosity_by_dissipation_half_width,viscosity_of_contacts,viscosity_of_contacts_half_width,\
+                 viscosity_of_friction,viscosity_of_friction_half_width,sticking_contacts,\
+                 sticking_contacts_half_width,sliding_contacts,sliding_contacts_half_width,N1,N1_half_width,N2,\
+                 N2_half_width,particle_pressure,particle_pressure_half_width,blocks_independent";
     assert!(text.lines().next().is_some_and(|line| line.contains(names)), "{text}");
     let cell = |line: usize, name: &str| {
         let place = text.lines().next().expect("a head").split(',').position(|one| one == name).expect(name);
