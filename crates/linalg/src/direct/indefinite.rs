@@ -19,7 +19,7 @@ use faer::sparse::linalg::cholesky::IntranodeLbltRef;
 
 use super::refinement::{Refinement, rounding_norm};
 use super::{
-    DirectError, PAR, RefinementParams, RefinementReport, SIDE, Scratch, Symbolic, check_finite, column,
+    DirectError, PAR, RefinementParams, RefinementReport, SIDE, Scratch, Symbolic, check_finite, columns,
 };
 use crate::operator::Preconditioner;
 use crate::sparse::SparseMatrix;
@@ -271,6 +271,6 @@ impl Factor {
     fn substitute(&mut self, symbolic: &Symbolic, x: &mut [f64]) {
         let pivots = PermRef::new_checked(&self.forward, &self.inverse, symbolic.dim());
         IntranodeLbltRef::new(&symbolic.analysis, &self.values, &self.subdiagonal, pivots)
-            .solve_in_place_with_conj(Conj::No, column(x), PAR, self.solve_scratch.stack());
+            .solve_in_place_with_conj(Conj::No, columns(x, symbolic.dim()), PAR, self.solve_scratch.stack());
     }
 }

@@ -230,8 +230,8 @@ fn check_finite(what: &'static str, values: &[f64]) -> Result<(), DirectError> {
     Err(DirectError::NotFinite { what, position })
 }
 
-/// A vector as faer's matrix of one column.
-fn column(x: &mut [f64]) -> MatMut<'_, f64> {
-    let rows = x.len();
-    MatMut::from_column_major_slice_mut(x, rows, 1)
+/// Vectors of this length, one after the other, as columns of faer's matrix.
+fn columns(x: &mut [f64], rows: usize) -> MatMut<'_, f64> {
+    let count = x.len().checked_div(rows).unwrap_or(0);
+    MatMut::from_column_major_slice_mut(x, rows, count)
 }

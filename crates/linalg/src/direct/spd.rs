@@ -8,7 +8,7 @@ use faer::sparse::linalg::cholesky::LltRef;
 
 use super::refinement::Refinement;
 use super::{
-    DirectError, PAR, RefinementParams, RefinementReport, SIDE, Scratch, Symbolic, check_finite, column,
+    DirectError, PAR, RefinementParams, RefinementReport, SIDE, Scratch, Symbolic, check_finite, columns,
 };
 use crate::operator::Preconditioner;
 use crate::sparse::SparseMatrix;
@@ -98,12 +98,13 @@ pub struct Substitution<'a> {
 }
 
 impl DirectSpd {
-    /// Substitution as by [`Preconditioner::apply`], beside others.
+    /// Substitution as by [`Preconditioner::apply`], beside others, for up to so many vectors one after the
+    /// other: together they take a fraction of the time of each alone.
     ///
     /// # Errors
     /// [`DirectError::OutOfMemory`].
-    pub fn substitution(&self) -> Result<Substitution<'_>, DirectError> {
-        let needed = self.symbolic.analysis.solve_in_place_scratch::<f64>(1, PAR);
+    pub fn substitution(&self, most_vectors: usize) -> Result<Substitution<'_>, DirectError> {
+        let needed = self.symbolic.analysis.solve_in_place_scratch::<f64>(most_vectors, PAR);
         Ok(Substitution { solver: self, scratch: Scratch::new(self.symbolic.dim(), needed)? })
     }
 }
@@ -135,11 +136,11 @@ fn answer(symbolic: &Symbolic, factor: Option<&Vec<f64>>, scratch: &mut Scratch,
     }
 }
 
-/// `x <- (L L^T)^-1 x`.
+/// `x <- (L L^T)^-1 x` for vectors one after the other.
 fn substitute(symbolic: &Symbolic, factor: &[f64], scratch: &mut Scratch, x: &mut [f64]) {
     LltRef::new(&symbolic.analysis, factor).solve_in_place_with_conj(
         Conj::No,
-        column(x),
+        columns(x, symbolic.dim()),
         PAR,
         scratch.stack(),
     );

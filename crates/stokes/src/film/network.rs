@@ -172,7 +172,7 @@ impl FilmNetwork {
         let dim = self.factor.symbolic().dim();
         Ok(FilmCorrection {
             network: self,
-            factor: self.factor.substitution()?,
+            factor: self.factor.substitution(1)?,
             residuals: vec![0.0; self.rows.len()],
             load: vec![0.0; dim],
             twists: vec![0.0; dim],
@@ -187,7 +187,7 @@ impl FilmNetwork {
     pub fn respond(&self, load: &mut [f64]) -> Result<Vec<f64>, DirectError> {
         self.clear_held(load);
         let mut motions = vec![0.0; load.len()];
-        self.factor.substitution()?.apply(load, &mut motions);
+        self.factor.substitution(1)?.apply(load, &mut motions);
         Ok(motions)
     }
 

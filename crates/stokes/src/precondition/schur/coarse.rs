@@ -27,8 +27,8 @@ use crate::space::Discretisation;
 
 /// Largest dense matrix.
 const MOST_PRESSURES: usize = 1000;
-/// Least number of columns of `S_0` that one thread finds.
-const LEAST_COLUMNS: usize = 16;
+/// Columns of `S_0` that a thread finds at a time.
+const COLUMNS: usize = 16;
 /// The matrix is that of a box whose shear is a multiple of this.
 const SHEARS: f64 = 0.125;
 /// Share of the mass that is added to `S_0`, for meshes so coarse that some pressure acts on no velocity.
@@ -206,20 +206,26 @@ fn dense_schur<const D: usize>(
     let factor = factorised(&assembled.matrix, Ordering::Amd)?;
     let velocities = system.velocity_dim();
     let mut schur = DMatrix::zeros(unknowns.len(), unknowns.len());
-    let columns = schur.as_mut_slice().par_chunks_mut(unknowns.len().max(1)).zip(unknowns);
-    let failures = columns.with_min_len(LEAST_COLUMNS).map_init(
-        || (factor.substitution(), SystemOperator::new(system)),
-        |(factor, operator), (column, &q)| {
+    let [count, free] = [unknowns.len(), assembled.unknowns.len()].map(|len| len.max(1));
+    let blocks = schur.as_mut_slice().par_chunks_mut(COLUMNS * count).zip(unknowns.par_chunks(COLUMNS));
+    let failures = blocks.map_init(
+        || (factor.substitution(COLUMNS), SystemOperator::new(system)),
+        |(factor, operator), (columns, pressures)| {
             let factor = factor.as_mut().map_err(|error| error.clone())?;
-            let [mut load, mut velocity] = [(); 2].map(|()| vec![0.0; assembled.unknowns.len()]);
-            let (mut x, mut y) = (vec![0.0f64; system.dim()], vec![0.0; system.dim()]);
-            x[velocities + q as usize] = 1.0;
-            operator.apply(&x, &mut y);
-            assembled.unknowns.gather(&y, &mut load);
-            factor.apply(&load, &mut velocity);
-            assembled.unknowns.scatter(&velocity, &mut x);
-            operator.apply(&x, &mut y);
-            column.iter_mut().zip(unknowns).for_each(|(entry, &p)| *entry = y[velocities + p as usize]);
+            let [mut loads, mut answers] = [(); 2].map(|()| vec![0.0; pressures.len() * free]);
+            let [mut x, mut y] = [(); 2].map(|()| vec![0.0f64; system.dim()]);
+            for (load, &q) in loads.chunks_exact_mut(free).zip(pressures) {
+                x[velocities + q as usize] = 1.0;
+                operator.apply(&x, &mut y);
+                x[velocities + q as usize] = 0.0;
+                assembled.unknowns.gather(&y, load);
+            }
+            factor.apply(&loads, &mut answers);
+            for (column, answer) in columns.chunks_exact_mut(count).zip(answers.chunks_exact(free)) {
+                assembled.unknowns.scatter(answer, &mut x);
+                operator.apply(&x, &mut y);
+                column.iter_mut().zip(unknowns).for_each(|(entry, &p)| *entry = y[velocities + p as usize]);
+            }
             Ok(())
         },
     );
