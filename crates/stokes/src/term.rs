@@ -15,7 +15,7 @@ use crate::space::VelocitySpace;
 /// Terms in the order in which they are added up.
 pub type Terms<const D: usize> = Vec<Arc<dyn Term<D>>>;
 
-/// Fills the matrix of a piece, by its place, for velocities alone.
+/// Fills the matrix of a cell for velocities alone, by the place of its first piece.
 pub type PieceMatrices<'a> = Box<dyn FnMut(usize, &mut [f64]) + 'a>;
 
 /// A force per unit of volume.
@@ -41,7 +41,7 @@ pub trait Term<const D: usize>:
         false
     }
 
-    /// Cell and body of each piece.
+    /// Cell and body of each piece; those of a cell follow each other.
     fn pieces(&self) -> Box<dyn Iterator<Item = (usize, usize)> + '_> {
         Box::new(std::iter::empty())
     }
@@ -50,7 +50,7 @@ pub trait Term<const D: usize>:
     /// the pressures' mass is taken from their block.
     fn fill(&self, _piece: usize, _compressibility: f64, _matrix: &mut [f64]) {}
 
-    /// What fills the matrices of pieces for velocities alone.
+    /// What fills the matrices of whole cells for velocities alone, each by the place of its first piece.
     fn viscous_matrices(&self) -> PieceMatrices<'_> {
         Box::new(|_, _| ())
     }

@@ -38,4 +38,4 @@ pub use flat::FlatInCell;
 pub use moments::{CutMoments, CutRules, SurfaceMoments};
 pub use polynomials::POINTS;
 pub use products::{PairLines, Products};
-pub use viscous::{ViscousMatrices, ViscousWeights};
+pub use viscous::ViscousMatrices;

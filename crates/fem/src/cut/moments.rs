@@ -37,6 +37,15 @@ pub struct SurfaceMoments<const D: usize> {
 }
 
 impl<const D: usize> CutMoments<D> {
+    /// Integrals over all surfaces.
+    pub fn area(&self) -> Vec<f64> {
+        let mut sum = vec![0.0; self.volume.len()];
+        for surface in &self.surfaces {
+            sum.iter_mut().zip(&surface.area).for_each(|(sum, area)| *sum += area);
+        }
+        sum
+    }
+
     /// The moments of a cell that these balls cut.
     pub fn new(balls: &[BallInCell<D>]) -> Self {
         Self::truncated(balls.iter().map(|ball| (ball, &[][..])))

@@ -11,25 +11,13 @@
 
 use gluey_linalg::vectorised;
 
+use super::moments::{CutMoments, SurfaceMoments};
 use super::polynomials::POINTS;
 use super::products::{PairLines, Places, Products, add_products, pair_count};
 use crate::element::node_count;
 
 /// Points of a cell, at most.
 const MOST_POINTS: usize = POINTS * POINTS * POINTS;
-
-/// The weights of the points of a cell.
-#[derive(Clone, Copy, Debug)]
-pub struct ViscousWeights<'a, const D: usize> {
-    /// Integrals over the fluid; empty if another part of the cell has them.
-    pub volume: &'a [f64],
-    /// Integrals of the normal out of the fluid.
-    pub normal: &'a [[f64; D]],
-    /// Integrals over the surface, which `penalty` multiplies.
-    pub area: &'a [f64],
-    /// Nitsche's penalty.
-    pub penalty: f64,
-}
 
 /// Tables that viscous matrices are made with.
 #[derive(Clone, Debug)]
@@ -59,31 +47,35 @@ impl<const D: usize> ViscousMatrices<D> {
         }
     }
 
-    /// Writes the matrix in units of `factor`, row by row, components of a node side by side.
-    pub fn fill(&mut self, weights: &ViscousWeights<'_, D>, factor: f64, matrix: &mut [f64]) {
+    /// Writes the matrix of a cell with Nitsche's penalty, in units of `factor`, row by row, components of a
+    /// node side by side.
+    pub fn fill(&mut self, moments: &CutMoments<D>, penalty: f64, factor: f64, matrix: &mut [f64]) {
         self.volume.clear();
-        if !weights.volume.is_empty() {
-            self.volume.add(&self.lines, weights.volume);
-        }
+        self.volume.add(&self.lines, &moments.volume);
         self.volume.shear(self.shear);
         vectorised(
             #[inline(always)]
-            || self.integrate(weights),
+            || self.integrate(&moments.surfaces, penalty),
         );
         self.write(factor, matrix);
     }
 
-    /// The integrals over the surface.
+    /// The integrals over all surfaces.
     #[inline(always)]
-    fn integrate(&mut self, weights: &ViscousWeights<'_, D>) {
+    fn integrate(&mut self, surfaces: &[SurfaceMoments<D>], factor: f64) {
         let Self { lines, normal, penalty, .. } = self;
         let mut numbers = [0.0; MOST_POINTS];
-        let numbers = &mut numbers[..weights.area.len()];
-        numbers.iter_mut().zip(weights.area).for_each(|(n, area)| *n = weights.penalty * area);
+        let numbers = &mut numbers[..POINTS.pow(D as u32)];
+        for surface in surfaces {
+            numbers.iter_mut().zip(&surface.area).for_each(|(n, area)| *n += factor * area);
+        }
         penalty.fill(0.0);
         add_products(lines, [None, None], numbers, penalty);
         for b in 0..D {
-            numbers.iter_mut().zip(weights.normal).for_each(|(n, normal)| *n = normal[b]);
+            numbers.fill(0.0);
+            for surface in surfaces {
+                numbers.iter_mut().zip(&surface.normal).for_each(|(n, normal)| *n += normal[b]);
+            }
             for (a, of_normals) in normal.iter_mut().enumerate() {
                 of_normals[b].fill(0.0);
                 add_products(lines, [None, Some(a)], numbers, &mut of_normals[b]);

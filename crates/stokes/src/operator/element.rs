@@ -122,6 +122,13 @@ impl<'a, const D: usize> Elements<'a, D> {
         }))
     }
 
+    /// All that has a matrix for velocities alone: a cell with pieces once, with the first.
+    pub fn viscous_sources(&self) -> impl Iterator<Item = MatrixSource> + 'a {
+        let mut last = None;
+        self.sources()
+            .filter(move |source| !source.is_piece() || last.replace(source.cell()) != Some(source.cell()))
+    }
+
     /// Writes the matrix of a cell or a piece, row by row.
     pub fn fill_source(&self, source: MatrixSource, matrix: &mut [f64]) {
         match source {
@@ -133,12 +140,12 @@ impl<'a, const D: usize> Elements<'a, D> {
         }
     }
 
-    /// What fills the velocities' part of the matrices of pieces, term by term.
+    /// What fills the matrices of cells with pieces, term by term, for velocities alone.
     pub fn of_pieces(&self) -> Vec<PieceMatrices<'a>> {
         self.system.terms.iter().map(|term| term.viscous_matrices()).collect()
     }
 
-    /// Writes the matrix of a cell, or the velocities' part of that of a piece, row by row.
+    /// Writes the matrix of one of the [`Elements::viscous_sources`], row by row.
     pub fn fill_velocities(
         &self,
         source: MatrixSource,

@@ -20,7 +20,7 @@ pub fn assemble_on_nodes<const D: usize>(
 ) -> Result<SymmetricBlockMatrix<D>, SparseError> {
     let (forms, mut terms) = (NodeForms::new(nodes, elements.system().space.ghosts()), Vec::new());
     let (mut sources, mut groups) = (Vec::new(), BlockGroups::default());
-    for source in elements.sources() {
+    for source in elements.viscous_sources() {
         forms.of_cell(source.cell(), &mut terms);
         if !terms.is_empty() {
             groups.push(terms.iter().map(|term| term.row as usize));

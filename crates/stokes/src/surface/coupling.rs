@@ -2,7 +2,7 @@
 
 use gluey_fem::Constraint;
 use gluey_fem::cells::{CellScalar, CutOperator, CutPiece};
-use gluey_fem::cut::{POINTS, ViscousMatrices, ViscousWeights};
+use gluey_fem::cut::{POINTS, ViscousMatrices};
 use gluey_fem::element::{gauss_cube, node_count, value};
 use gluey_geom::{Dim, Twist, Vector};
 use gluey_levelset::{Ball, Body};
@@ -144,18 +144,10 @@ impl<const D: usize> SurfaceCoupling<D> {
         self.penalties[place]
     }
 
-    /// The part of the matrix of a piece for velocities alone.
-    pub fn viscous_matrix(&self, piece: usize, with: &mut ViscousMatrices<D>, matrix: &mut [f64]) {
-        let (place, number) = self.pieces[piece];
-        let cell = &self.cut.cells[place as usize];
-        let surface = &cell.moments.surfaces[number as usize];
-        let weights = ViscousWeights {
-            volume: if number == 0 { &cell.moments.volume } else { &[] },
-            normal: &surface.normal,
-            area: &surface.area,
-            penalty: self.penalties[place as usize],
-        };
-        with.fill(&weights, self.stress(cell), matrix);
+    /// The matrix of a cut cell for velocities alone, by its place among these.
+    pub fn viscous_matrix(&self, place: usize, with: &mut ViscousMatrices<D>, matrix: &mut [f64]) {
+        let cell = &self.cut.cells[place];
+        with.fill(&cell.moments, self.penalties[place], self.stress(cell), matrix);
     }
 
     /// Adds the part of the matrix of a piece for the twist of its body, row by row.

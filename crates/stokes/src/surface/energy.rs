@@ -47,8 +47,8 @@ impl<'a, const D: usize> StrainEnergy<'a, D> {
     /// `h int 4 eps:eps` over the surfaces in a cut cell with edges of length `h`.
     pub fn at_surfaces(&self, place: usize, velocity: &[f64], strain: &Matrix<D>) -> f64 {
         let cut = &self.cut.cells[place];
-        let area = |q: usize| cut.moments.surfaces.iter().map(|surface| surface.area[q]).sum::<f64>();
-        self.sum(cut.cell as usize, &self.fine, velocity, strain, |q, _| area(q))
+        let area = cut.moments.area();
+        self.sum(cut.cell as usize, &self.fine, velocity, strain, |q, _| area[q])
     }
 
     /// `h^D` times the sum of `4 eps:eps` at the points of a rule with the weights `weight(q, w_q)`.

@@ -89,7 +89,7 @@ pub fn penalties<const D: usize>(
                 .then(|| PairLines::new(offset(discretisation, root, cell.cell as usize)));
             let lines = elsewhere.as_ref().unwrap_or(&at_home);
             volume.add(lines, &moments.volume);
-            moments.surfaces.iter().for_each(|part| surface.add(lines, &part.area));
+            surface.add(lines, &moments.area());
         }
         let shear = discretisation.mesh.shear();
         [&mut volume, &mut surface].into_iter().for_each(|products| products.shear(shear));

@@ -48,7 +48,7 @@ impl<const D: usize> Term<D> for SurfaceCoupling<D> {
 
     fn viscous_matrices(&self) -> PieceMatrices<'_> {
         let mut with = ViscousMatrices::new(self.discretisation().mesh.shear());
-        Box::new(move |piece, matrix| self.viscous_matrix(piece, &mut with, matrix))
+        Box::new(move |piece, matrix| self.viscous_matrix(self.pieces[piece].0 as usize, &mut with, matrix))
     }
 
     fn add_twist_blocks(&self, blocks: &mut [f64]) {

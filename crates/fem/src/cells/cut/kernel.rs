@@ -61,7 +61,8 @@ pub(super) const fn numbers<const D: usize>() -> usize {
 
 /// Pieces side by side in vectors: one number per lane.
 pub(super) struct Pieces<'a, V: Lanes> {
-    /// Moments times `eta h^(D-2)`, point by point, [`numbers`] each, `step` apart.
+    /// Moments times `eta h^(D-2)`, `step` apart: [`numbers`] for each point of a line along the last
+    /// direction, line by line, in the order in which they are read.
     pub moments: &'a [V::Scalar],
     /// Distance of successive numbers.
     pub step: usize,
@@ -270,7 +271,7 @@ impl<V: Lanes> Planes<V> {
             }
             point.p = dot(&shapes.pressure[q], &self.pressure[line]).mul(pieces.pressure);
             let arm = pieces.arm::<D>(shapes, line, q);
-            let moments = pieces.at::<D>(line + POINTS.pow(D as u32 - 1) * q);
+            let moments = pieces.at::<D>(line * POINTS + q);
             let mut tested = point.tested::<D>(&moments, &arm, twist);
             for gradient in &mut tested.gradient[..D] {
                 gradient[0] = gradient[0].sub(gradient[1].mul(pieces.shear));
@@ -316,7 +317,7 @@ impl<V: Lanes> Pieces<'_, V> {
         arm
     }
 
-    /// Volume, normal and penalty at a point.
+    /// Volume, normal and penalty at a point, by its place in the moments.
     #[inline(always)]
     fn at<const D: usize>(&self, point: usize) -> [V; MOST + 2] {
         let count = numbers::<D>();

@@ -50,7 +50,7 @@ pub struct CutOperator<T, const D: usize> {
     /// Place of the first number of a node, a pressure or a twist in the vectors, slot by slot in groups of
     /// lanes.
     places: Vec<u32>,
-    /// Moments: group by group, point by point, number by number.
+    /// Moments: group by group, see [`Pieces::moments`].
     moments: Vec<T>,
     /// `h / eta`, edge and origin: numbers of each piece, group by group.
     geometry: Vec<T>,
@@ -119,12 +119,14 @@ impl<T: CellScalar, const D: usize> CutOperator<T, D> {
         for (k, value) in geometry.enumerate() {
             self.geometry[at(Self::GEOMETRY, k)] = T::from_f64(value);
         }
-        for q in 0..POINTS.pow(D as u32) {
+        let lines = POINTS.pow(D as u32 - 1);
+        for q in 0..lines * POINTS {
+            let place = q % lines * POINTS + q / lines;
             let volume = data.volume.get(q).copied().unwrap_or(0.0);
             let all = [volume].into_iter().chain(data.normal[q]).chain([data.penalty[q]]);
             for (k, value) in all.enumerate() {
                 let number = T::from_f64(data.viscous * value);
-                self.moments[at(Self::NUMBERS, q * numbers::<D>() + k)] = number;
+                self.moments[at(Self::NUMBERS, place * numbers::<D>() + k)] = number;
             }
         }
     }

@@ -3,7 +3,7 @@ use gluey_linalg::vector::fill_pseudo_random;
 use super::super::simd::Portable;
 use super::kernel::{slots, twist_len};
 use super::*;
-use crate::cut::{BallInCell, CutMoments, POINTS, ViscousMatrices, ViscousWeights};
+use crate::cut::{BallInCell, CutMoments, POINTS, ViscousMatrices};
 use crate::element::{gauss_cube, gradient, node_count, value};
 
 /// Arms, edge, viscosity and `h / eta` of the piece below.
@@ -137,15 +137,8 @@ fn products_give_the_viscous_matrix<const D: usize>(shear: f64) {
     let (moments, _) = moments::<D>(shear);
     let (size, n) = (slots::<D>(), D * node_count::<D>(2));
     let matrix = matrix(&operator::<f64, D>(shear, 1), 0);
-    let surface = &moments.surfaces[0];
-    let weights = ViscousWeights {
-        volume: &moments.volume,
-        normal: &surface.normal,
-        area: &surface.area,
-        penalty: 20.0,
-    };
     let mut found = vec![f64::NAN; n * n];
-    ViscousMatrices::new(shear).fill(&weights, VISCOUS, &mut found);
+    ViscousMatrices::new(shear).fill(&moments, 20.0, VISCOUS, &mut found);
     for (row, found) in found.chunks_exact(n).enumerate() {
         for (found, expected) in found.iter().zip(&matrix[row * size..]) {
             assert!((found - expected).abs() < 1e-12 * (1.0 + expected.abs()), "{found} {expected}");

@@ -86,7 +86,7 @@ impl<'a, const D: usize> Contributions<'a, D> {
     fn new(nodes: &'a NumberedNodes<'a, D>, elements: &'a Elements<'a, D>) -> Self {
         let forms = NodeForms::new(nodes, elements.system().space.ghosts());
         let (mut terms, mut sources, mut pairs) = (Vec::new(), Vec::new(), Vec::new());
-        for source in elements.sources() {
+        for source in elements.viscous_sources() {
             forms.of_cell(source.cell(), &mut terms);
             let rows = terms.chunk_by(|a, b| a.row == b.row).map(|terms| terms[0].row);
             pairs.extend(rows.map(|row| (row, sources.len() as u32)));
