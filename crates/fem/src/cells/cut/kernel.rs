@@ -1,8 +1,8 @@
 //! The forms on a vector of pieces, one direction after another.
 //!
-//! Velocities go from nodes to values and derivatives at the points of all directions but the last
-//! ([`Planes`]); then line by line along the last direction to the points, where the forms are taken, and
-//! back.
+//! Velocities go from nodes to a plane of points of the first direction, from there to lines of points along
+//! the last, and to the points, where the forms are taken, and back: what is in use fits into the cache next
+//! to the processor.
 
 use gluey_linalg::Scalar;
 
@@ -59,10 +59,17 @@ pub(super) const fn numbers<const D: usize>() -> usize {
     D + 2
 }
 
+/// Place in the moments of a piece of a point of [`gauss_cube`](crate::element::gauss_cube): the last
+/// direction runs first.
+pub(super) fn place<const D: usize>(point: usize) -> usize {
+    let (q, last) = (point % POINTS, point / POINTS.pow(D as u32 - 1));
+    let between = POINTS.pow(D as u32 - 2);
+    (q * between + point / POINTS % between) * POINTS + last
+}
+
 /// Pieces side by side in vectors: one number per lane.
 pub(super) struct Pieces<'a, V: Lanes> {
-    /// Moments times `eta h^(D-2)`, `step` apart: [`numbers`] for each point of a line along the last
-    /// direction, line by line, in the order in which they are read.
+    /// Moments times `eta h^(D-2)`, `step` apart: [`numbers`] for each point at [`place`], as they are read.
     pub moments: &'a [V::Scalar],
     /// Distance of successive numbers.
     pub step: usize,
@@ -76,11 +83,15 @@ pub(super) struct Pieces<'a, V: Lanes> {
     pub edge: V,
 }
 
-/// Fields at the points of all directions but the last and at the nodes of the last: per component the value
-/// and the derivatives in these directions.
-struct Planes<V: Lanes> {
-    velocity: [[[[V; NODES]; LINES]; MOST]; MOST],
-    pressure: [[V; 2]; LINES],
+/// Velocities, or loads on them, at points of the first direction and at the nodes of the others: for each
+/// component the values and the derivatives in the first direction.
+type Plane<V> = [[[[V; NODES]; NODES]; 2]; MOST];
+
+/// Fields at points of all directions but the last and at its nodes: for each component the value and the
+/// derivatives in these directions; and pressures.
+struct LineFields<V> {
+    velocity: [[[V; NODES]; MOST]; MOST],
+    pressure: [V; 2],
 }
 
 /// `y = [A, -B^T; -B, 0] x` on a vector of pieces; slots are `step` numbers apart.
@@ -91,20 +102,29 @@ pub(super) fn apply<V: Lanes, const D: usize>(
     x: &[V::Scalar],
     y: &mut [V::Scalar],
 ) {
-    let mut planes = Planes::<V>::zeros();
     let get = |slot: usize| V::load(&x[slot * pieces.step..]);
-    planes.evaluate::<D>(shapes, get);
     let twist =
         std::array::from_fn(|k| if k < twist_len::<D>() { get(first_twist::<D>() + k) } else { zero() });
-    let mut load = [zero(); 2 * MOST];
-    for line in 0..POINTS.pow(D as u32 - 1) {
-        planes.line::<D>(shapes, pieces, line, &twist, &mut load);
+    let mut pressures = pressures::<V, D>(shapes, get);
+    let mut loads = [[[[[zero(); NODES]; NODES]; 2]; MOST]; POINTS];
+    let mut of_ball = [zero(); 2 * MOST];
+    for (q, loads) in loads.iter_mut().enumerate() {
+        let plane = plane::<V, D>(shapes, q, get);
+        for r in 0..POINTS.pow(D as u32 - 2) {
+            let k = q + POINTS * r;
+            let mut line =
+                LineFields { velocity: velocities::<V, D>(shapes, r, &plane), pressure: pressures[k] };
+            line.take_forms::<D>(shapes, pieces, [q, r], &twist, &mut of_ball);
+            pressures[k] = line.pressure;
+            add_to_plane::<V, D>(shapes, r, &line.velocity, loads);
+        }
     }
     let mut put = |slot: usize, value: V| value.store(&mut y[slot * pieces.step..]);
-    for (k, load) in load[..twist_len::<D>()].iter().enumerate() {
+    for (k, load) in of_ball[..twist_len::<D>()].iter().enumerate() {
         put(first_twist::<D>() + k, *load);
     }
-    planes.evaluate_transpose::<D>(shapes, put);
+    put_velocities::<V, D>(shapes, &loads, &mut put);
+    put_pressures::<V, D>(shapes, &pressures, put);
 }
 
 const fn first_twist<const D: usize>() -> usize {
@@ -116,162 +136,179 @@ fn zero<V: Lanes>() -> V {
     V::splat(V::Scalar::ZERO)
 }
 
-impl<V: Lanes> Planes<V> {
-    #[inline(always)]
-    fn zeros() -> Self {
-        Self { velocity: [[[[zero(); NODES]; LINES]; MOST]; MOST], pressure: [[zero(); 2]; LINES] }
+/// The velocities in the plane at a point `q` of the first direction.
+#[inline(always)]
+fn plane<V: Lanes, const D: usize>(
+    shapes: &Shapes<V::Scalar>,
+    q: usize,
+    get: impl Fn(usize) -> V,
+) -> Plane<V> {
+    let mut plane = [[[[zero(); NODES]; NODES]; 2]; MOST];
+    for c in 0..D {
+        for last in 0..NODES {
+            for j in 0..NODES.pow(D as u32 - 2) {
+                let start = c * node_count::<D>(2) + NODES * j + NODES.pow(D as u32 - 1) * last;
+                let line = [get(start), get(start + 1), get(start + 2)];
+                for kind in 0..2 {
+                    plane[c][kind][last][j] = dot(&shapes.velocity[kind][q], &line);
+                }
+            }
+        }
     }
+    plane
+}
 
-    /// From nodes to planes.
-    #[inline(always)]
-    fn evaluate<const D: usize>(&mut self, shapes: &Shapes<V::Scalar>, get: impl Fn(usize) -> V) {
-        let n = node_count::<D>(2);
-        for c in 0..D {
-            for last in 0..NODES {
-                let mut rows = [[[zero(); POINTS]; NODES]; 2];
-                for j in 0..NODES.pow(D as u32 - 2) {
-                    let start = c * n + NODES * j + NODES.pow(D as u32 - 1) * last;
-                    let line = [get(start), get(start + 1), get(start + 2)];
+/// The velocities in the line at a point `r` of the second direction of three.
+#[inline(always)]
+fn velocities<V: Lanes, const D: usize>(
+    shapes: &Shapes<V::Scalar>,
+    r: usize,
+    plane: &Plane<V>,
+) -> [[[V; NODES]; MOST]; MOST] {
+    let mut line = [[[zero(); NODES]; MOST]; MOST];
+    for c in 0..D {
+        for last in 0..NODES {
+            let [values, slopes] = [0, 1].map(|kind| &plane[c][kind][last]);
+            if D == 2 {
+                line[c][0][last] = values[0];
+                line[c][1][last] = slopes[0];
+                continue;
+            }
+            line[c][0][last] = dot(&shapes.velocity[0][r], values);
+            line[c][1][last] = dot(&shapes.velocity[0][r], slopes);
+            line[c][2][last] = dot(&shapes.velocity[1][r], values);
+        }
+    }
+    line
+}
+
+/// The transpose of [`velocities`].
+#[inline(always)]
+fn add_to_plane<V: Lanes, const D: usize>(
+    shapes: &Shapes<V::Scalar>,
+    r: usize,
+    line: &[[[V; NODES]; MOST]; MOST],
+    loads: &mut Plane<V>,
+) {
+    for c in 0..D {
+        for last in 0..NODES {
+            let [value, first, second] = [0, 1, 2].map(|kind| line[c][kind][last]);
+            if D == 2 {
+                loads[c][0][last][0] = value;
+                loads[c][1][last][0] = first;
+                continue;
+            }
+            for j in 0..NODES {
+                let [shape, slope] = [0, 1].map(|kind| V::splat(shapes.velocity[kind][r][j]));
+                let own = value.mul_add(shape, loads[c][0][last][j]);
+                loads[c][0][last][j] = second.mul_add(slope, own);
+                loads[c][1][last][j] = first.mul_add(shape, loads[c][1][last][j]);
+            }
+        }
+    }
+}
+
+/// The transpose of [`plane`], of all planes.
+#[inline(always)]
+fn put_velocities<V: Lanes, const D: usize>(
+    shapes: &Shapes<V::Scalar>,
+    loads: &[Plane<V>; POINTS],
+    put: &mut impl FnMut(usize, V),
+) {
+    for c in 0..D {
+        for last in 0..NODES {
+            for j in 0..NODES.pow(D as u32 - 2) {
+                let start = c * node_count::<D>(2) + NODES * j + NODES.pow(D as u32 - 1) * last;
+                for i in 0..NODES {
+                    let mut sum = zero::<V>();
                     for kind in 0..2 {
                         for q in 0..POINTS {
-                            rows[kind][j][q] = dot(&shapes.velocity[kind][q], &line);
+                            let shape = V::splat(shapes.velocity[kind][q][i]);
+                            sum = loads[q][c][kind][last][j].mul_add(shape, sum);
                         }
                     }
+                    put(start + i, sum);
                 }
-                self.set_plane::<D>(shapes, [c, last], &rows);
-            }
-        }
-        for last in 0..2 {
-            let corner = |k: usize| get(D * n + 2usize.pow(D as u32 - 1) * last + k);
-            for line in 0..POINTS.pow(D as u32 - 1) {
-                let [a, b] = [line % POINTS, line / POINTS].map(|q| &shapes.pressure[q]);
-                let mut sum = dot(a, &[corner(0), corner(1)]);
-                if D == 3 {
-                    sum = dot(b, &[sum, dot(a, &[corner(2), corner(3)])]);
-                }
-                self.pressure[line][last] = sum;
             }
         }
     }
+}
 
-    /// The second direction of a component in a plane of nodes, from values and derivatives in the first.
-    #[inline(always)]
-    fn set_plane<const D: usize>(
-        &mut self,
-        shapes: &Shapes<V::Scalar>,
-        [c, last]: [usize; 2],
-        rows: &[[[V; POINTS]; NODES]; 2],
-    ) {
-        let target = &mut self.velocity[c];
-        for q in 0..POINTS {
-            if D == 2 {
-                target[0][q][last] = rows[0][0][q];
-                target[1][q][last] = rows[1][0][q];
-                continue;
+/// The pressures of all lines.
+#[inline(always)]
+fn pressures<V: Lanes, const D: usize>(
+    shapes: &Shapes<V::Scalar>,
+    get: impl Fn(usize) -> V,
+) -> [[V; 2]; LINES] {
+    let mut pressures = [[zero(); 2]; LINES];
+    for last in 0..2 {
+        let corner = |k: usize| get(D * node_count::<D>(2) + 2usize.pow(D as u32 - 1) * last + k);
+        for line in 0..POINTS.pow(D as u32 - 1) {
+            let [a, b] = [line % POINTS, line / POINTS].map(|q| &shapes.pressure[q]);
+            let mut sum = dot(a, &[corner(0), corner(1)]);
+            if D == 3 {
+                sum = dot(b, &[sum, dot(a, &[corner(2), corner(3)])]);
             }
-            let [values, slopes] = [0, 1].map(|kind| [rows[kind][0][q], rows[kind][1][q], rows[kind][2][q]]);
-            for r in 0..POINTS {
-                let line = q + POINTS * r;
-                target[0][line][last] = dot(&shapes.velocity[0][r], &values);
-                target[1][line][last] = dot(&shapes.velocity[0][r], &slopes);
-                target[2][line][last] = dot(&shapes.velocity[1][r], &values);
-            }
+            pressures[line][last] = sum;
         }
     }
+    pressures
+}
 
-    /// The transpose of [`Planes::evaluate`].
-    #[inline(always)]
-    fn evaluate_transpose<const D: usize>(&self, shapes: &Shapes<V::Scalar>, mut put: impl FnMut(usize, V)) {
-        let n = node_count::<D>(2);
-        for c in 0..D {
-            for last in 0..NODES {
-                let rows = self.plane_loads::<D>(shapes, [c, last]);
-                for j in 0..NODES.pow(D as u32 - 2) {
-                    let start = c * n + NODES * j + NODES.pow(D as u32 - 1) * last;
-                    for i in 0..NODES {
-                        let mut sum = zero::<V>();
-                        for kind in 0..2 {
-                            for q in 0..POINTS {
-                                sum = rows[kind][j][q].mul_add(V::splat(shapes.velocity[kind][q][i]), sum);
-                            }
-                        }
-                        put(start + i, sum);
-                    }
-                }
+/// The transpose of [`pressures`].
+#[inline(always)]
+fn put_pressures<V: Lanes, const D: usize>(
+    shapes: &Shapes<V::Scalar>,
+    loads: &[[V; 2]; LINES],
+    mut put: impl FnMut(usize, V),
+) {
+    for corner in 0..node_count::<D>(1) {
+        let index = multi_index::<D>(corner, 2);
+        let mut sum = zero::<V>();
+        for line in 0..POINTS.pow(D as u32 - 1) {
+            let mut weight = shapes.pressure[line % POINTS][index[0]];
+            if D == 3 {
+                weight *= shapes.pressure[line / POINTS][index[1]];
             }
+            sum = loads[line][index[D - 1]].mul_add(V::splat(weight), sum);
         }
-        for corner in 0..node_count::<D>(1) {
-            let index = multi_index::<D>(corner, 2);
-            let mut sum = zero::<V>();
-            for line in 0..POINTS.pow(D as u32 - 1) {
-                let mut weight = shapes.pressure[line % POINTS][index[0]];
-                if D == 3 {
-                    weight *= shapes.pressure[line / POINTS][index[1]];
-                }
-                sum = self.pressure[line][index[D - 1]].mul_add(V::splat(weight), sum);
-            }
-            put(D * n + corner, sum);
-        }
+        put(D * node_count::<D>(2) + corner, sum);
     }
+}
 
-    /// The transpose of [`Planes::set_plane`].
+impl<V: Lanes> LineFields<V> {
+    /// The forms at the points of the line at these points of the directions before, which take the place of
+    /// what it held.
     #[inline(always)]
-    fn plane_loads<const D: usize>(
-        &self,
-        shapes: &Shapes<V::Scalar>,
-        [c, last]: [usize; 2],
-    ) -> [[[V; POINTS]; NODES]; 2] {
-        let mut rows = [[[zero(); POINTS]; NODES]; 2];
-        let from = &self.velocity[c];
-        for q in 0..POINTS {
-            if D == 2 {
-                rows[0][0][q] = from[0][q][last];
-                rows[1][0][q] = from[1][q][last];
-                continue;
-            }
-            for r in 0..POINTS {
-                let line = q + POINTS * r;
-                let [value, first, second] = [from[0][line][last], from[1][line][last], from[2][line][last]];
-                for j in 0..NODES {
-                    let [shape, slope] = [0, 1].map(|kind| V::splat(shapes.velocity[kind][r][j]));
-                    rows[0][j][q] = second.mul_add(slope, value.mul_add(shape, rows[0][j][q]));
-                    rows[1][j][q] = first.mul_add(shape, rows[1][j][q]);
-                }
-            }
-        }
-        rows
-    }
-
-    /// The forms at the points of a line, which takes the place of what it held.
-    #[inline(always)]
-    fn line<const D: usize>(
+    fn take_forms<const D: usize>(
         &mut self,
         shapes: &Shapes<V::Scalar>,
         pieces: &Pieces<'_, V>,
-        line: usize,
+        line: [usize; 2],
         twist: &[V; 2 * MOST],
         load: &mut [V; 2 * MOST],
     ) {
         let mut sums = [[[zero::<V>(); NODES]; MOST]; MOST];
         let mut pressure_sum = [zero::<V>(); 2];
+        let first = (line[0] * POINTS.pow(D as u32 - 2) + line[1]) * POINTS;
         for q in 0..POINTS {
             let [shape, slope] = [0, 1].map(|kind| &shapes.velocity[kind][q]);
             let mut point =
                 PointValues::<V> { value: [zero(); MOST], gradient: [[zero(); MOST]; MOST], p: zero() };
             for c in 0..D {
                 let field = &self.velocity[c];
-                point.value[c] = dot(shape, &field[0][line]);
+                point.value[c] = dot(shape, &field[0]);
                 for d in 0..D - 1 {
-                    point.gradient[c][d] = dot(shape, &field[1 + d][line]);
+                    point.gradient[c][d] = dot(shape, &field[1 + d]);
                 }
-                point.gradient[c][D - 1] = dot(slope, &field[0][line]);
+                point.gradient[c][D - 1] = dot(slope, &field[0]);
                 // In space.
                 let along = point.gradient[c][0].mul(pieces.shear);
                 point.gradient[c][1] = point.gradient[c][1].sub(along);
             }
-            point.p = dot(&shapes.pressure[q], &self.pressure[line]).mul(pieces.pressure);
+            point.p = dot(&shapes.pressure[q], &self.pressure).mul(pieces.pressure);
             let arm = pieces.arm::<D>(shapes, line, q);
-            let moments = pieces.at::<D>(line * POINTS + q);
+            let moments = pieces.at::<D>(first + q);
             let mut tested = point.tested::<D>(&moments, &arm, twist);
             for gradient in &mut tested.gradient[..D] {
                 gradient[0] = gradient[0].sub(gradient[1].mul(pieces.shear));
@@ -292,20 +329,16 @@ impl<V: Lanes> Planes<V> {
             }
             add_twist_load::<V, D>(&tested.value, &arm, load);
         }
-        for c in 0..D {
-            for kind in 0..D {
-                self.velocity[c][kind][line] = sums[c][kind];
-            }
-        }
-        self.pressure[line] = pressure_sum;
+        self.velocity = sums;
+        self.pressure = pressure_sum;
     }
 }
 
 impl<V: Lanes> Pieces<'_, V> {
     /// Arm of a point from the centre of the ball, in its radii.
     #[inline(always)]
-    fn arm<const D: usize>(&self, shapes: &Shapes<V::Scalar>, line: usize, last: usize) -> [V; MOST] {
-        let index = [line % POINTS, line / POINTS, last];
+    fn arm<const D: usize>(&self, shapes: &Shapes<V::Scalar>, line: [usize; 2], last: usize) -> [V; MOST] {
+        let index = [line[0], line[1], last];
         let mut arm = [zero(); MOST];
         for d in 0..D {
             let at = if d == D - 1 { last } else { index[d] };

@@ -119,9 +119,8 @@ impl<T: CellScalar, const D: usize> CutOperator<T, D> {
         for (k, value) in geometry.enumerate() {
             self.geometry[at(Self::GEOMETRY, k)] = T::from_f64(value);
         }
-        let lines = POINTS.pow(D as u32 - 1);
-        for q in 0..lines * POINTS {
-            let place = q % lines * POINTS + q / lines;
+        for q in 0..POINTS.pow(D as u32) {
+            let place = kernel::place::<D>(q);
             let volume = data.volume.get(q).copied().unwrap_or(0.0);
             let all = [volume].into_iter().chain(data.normal[q]).chain([data.penalty[q]]);
             for (k, value) in all.enumerate() {
