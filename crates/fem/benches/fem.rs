@@ -1,4 +1,5 @@
-//! Timings of the finite-element core: meshes, numbering, and the bare cell kernels in both precisions.
+//! Timings of the finite-element core: meshes, numbering, and the bare kernels of whole and of cut cells in
+//! both precisions.
 //!
 //! `cargo bench -p gluey-fem`; `docs/benchmarks.md` has a table of a run.
 
@@ -7,9 +8,11 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
-use gluey_fem::cells::{CellData, CellOperator, CellScalar, Workspace};
+use gluey_fem::cells::{CellData, CellOperator, CellScalar, CutOperator, CutPiece, Workspace};
+use gluey_fem::cut::{BallInCell, CutMoments};
+use gluey_fem::element::node_count;
 use gluey_fem::{Chunks, Interpolation, NodeMap, TreeMesh};
-use gluey_geom::{Aabb, Vector};
+use gluey_geom::{Aabb, Dim, Vector};
 
 /// A mesh refined towards the centre of the box.
 fn graded<const D: usize>(finest: u8) -> TreeMesh<D> {
@@ -64,6 +67,38 @@ fn operator<T: CellScalar, const D: usize>(criterion: &mut Criterion, level: u8,
     group.finish();
 }
 
+/// The Stokes operator on pieces of cut cells, with nodes of their own; throughput in pieces.
+fn cut<T: CellScalar, const D: usize>(criterion: &mut Criterion) {
+    const PIECES: usize = 1296;
+    const RADIUS: f64 = 2.3;
+    let center = std::array::from_fn(|d| 1.9 - 0.3 * d as f64);
+    let moments = CutMoments::new(&[BallInCell { center, radius: RADIUS }]);
+    let penalty: Vec<f64> = moments.surfaces[0].area.iter().map(|area| 20.0 * area).collect();
+    let (n, m) = (node_count::<D>(2), node_count::<D>(1));
+    let nodes: Vec<u32> = (0..(PIECES * n) as u32).collect();
+    let piece = |k: usize| CutPiece {
+        nodes: &nodes[k * n..][..n],
+        pressures: &nodes[k * m..][..m],
+        body: k as u32,
+        origin: center.map(|x| -x / RADIUS),
+        edge: 1.0 / RADIUS,
+        viscous: 1.0,
+        pressure: 1.0,
+        volume: &moments.volume,
+        normal: &moments.surfaces[0].normal,
+        penalty: &penalty,
+    };
+    let pieces: Vec<CutPiece<'_, D>> = (0..PIECES).map(piece).collect();
+    let operator = CutOperator::<T, D>::new(pieces.into_iter(), [PIECES * n, PIECES * m, PIECES]);
+    let wave = |dim: usize| (0..dim).map(|i| T::from_f64((0.7 * i as f64).sin())).collect::<Vec<T>>();
+    let (x, p) = (wave(PIECES * (n * D + Dim::<D>::RIGID)), wave(PIECES * m));
+    let (mut y, mut q, mut work) = (x.clone(), p.clone(), Vec::new());
+    let mut group = criterion.benchmark_group(format!("cut-cells-{D}d-f{}", 8 * size_of::<T>()));
+    group.throughput(Throughput::Elements(PIECES as u64));
+    group.bench_function("stokes", |b| b.iter(|| operator.add([&x, &p], [&mut y, &mut q], &mut work)));
+    group.finish();
+}
+
 fn all(criterion: &mut Criterion) {
     meshes::<2>(criterion, 9);
     meshes::<3>(criterion, 7);
@@ -73,6 +108,10 @@ fn all(criterion: &mut Criterion) {
         operator::<f32, 3>(criterion, 5, varying);
         operator::<f64, 3>(criterion, 5, varying);
     }
+    cut::<f32, 2>(criterion);
+    cut::<f64, 2>(criterion);
+    cut::<f32, 3>(criterion);
+    cut::<f64, 3>(criterion);
 }
 
 criterion_group! {
