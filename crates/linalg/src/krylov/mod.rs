@@ -137,6 +137,9 @@ fn finite(value: f64, iteration: usize) -> Result<f64, KrylovError> {
 fn true_residual<T: Scalar>(a: &mut (impl LinOp<T> + ?Sized), b: &[T], x: &[T], r: &mut [T]) -> f64 {
     a.apply(x, r);
     let mut square = [vector::residual_square_from_product(b, r)];
+    if a.clear_rounding(b, x, r) {
+        square = [vector::dot(r, r)];
+    }
     a.complete(&mut square);
     square[0].sqrt()
 }

@@ -18,6 +18,13 @@ pub trait LinOp<T> {
     /// Changes an iterate for the right-hand side `b` so that equations hold exactly that are wanted to.
     /// Every iterate whose true residual [`crate::Gcr`] computes went through it.
     fn settle(&mut self, _b: &[T], _x: &mut [T]) {}
+
+    /// Sets entries of the residual `r = b - A x` to zero that are within the rounding error of their own
+    /// sums, where those are of terms so large that the rest of the residual cannot be seen beside it.
+    /// Returns whether there are any. Called after `y = A x`, with the same `x`.
+    fn clear_rounding(&mut self, _b: &[T], _x: &[T], _r: &mut [T]) -> bool {
+        false
+    }
 }
 
 /// An approximate inverse `M^-1` of an operator.
@@ -62,6 +69,10 @@ impl<T, A: LinOp<T> + ?Sized> LinOp<T> for &mut A {
 
     fn settle(&mut self, b: &[T], x: &mut [T]) {
         (**self).settle(b, x);
+    }
+
+    fn clear_rounding(&mut self, b: &[T], x: &[T], r: &mut [T]) -> bool {
+        (**self).clear_rounding(b, x, r)
     }
 }
 
