@@ -2,10 +2,13 @@
 
 use std::num::NonZeroUsize;
 use std::path::PathBuf;
+use std::sync::{Mutex, PoisonError};
+use std::time::Instant;
 
-use anyhow::Context;
+use anyhow::{Context, bail};
+use gluey::output::solver_log::SolverRow;
 use gluey::table::NumberTable;
-use gluey::{Case, CaseError, ResultPaths, RunOptions, RunReport, Silent};
+use gluey::{Case, CaseError, PhaseTable, Progress, ProgressState, ResultPaths, RunOptions, RunReport};
 use serde_json::{Map, Value, json};
 
 /// Strain of a step.
@@ -51,15 +54,15 @@ pub struct SuspensionBenchOptions {
 pub fn run(options: &SuspensionBenchOptions) -> anyhow::Result<()> {
     let pool = rayon::ThreadPoolBuilder::new().num_threads(options.threads.get()).build();
     let pool = pool.context("no pool of threads")?;
-    let Timed { report: first, cpu: one, motion } = pool.install(|| timed_run(options, 1, USUAL))?;
-    let Timed { report, cpu: all, .. } =
+    let Timed { report, start, ends, motion } =
         pool.install(|| timed_run(options, 1 + options.steps.get(), USUAL))?;
     let memory = gluey::memory::peak();
     let error = options.error.map(|cells| pool.install(|| errors(options, cells, &motion))).transpose()?;
+    let [first, .., last] = &ends[..] else { bail!("the run ended after {} steps", ends.len()) };
     let steps = options.steps.get() as f64;
-    let cpu = (all - one) / steps;
-    let per_step = |name: &str| (seconds(&report, name) - seconds(&first, name)) / steps;
-    let phases = report.phases.iter().map(|(name, _)| (name.clone(), per_step(name).into()));
+    let cpu = (last.cpu - first.cpu) / steps;
+    let per_step = |name: &str| (seconds(&last.phases, name) - seconds(&first.phases, name)) / steps;
+    let phases = last.phases.rows().iter().map(|(name, _)| (name.clone(), per_step(name).into()));
     let mut measured = json!({
         "dimension": options.dimension,
         "particles": options.count,
@@ -69,8 +72,8 @@ pub fn run(options: &SuspensionBenchOptions) -> anyhow::Result<()> {
         "unknowns": report.dofs,
         "threads": options.threads,
         "steps": options.steps,
-        "first_step_s": first.wall_s,
-        "step_s": (report.wall_s - first.wall_s) / steps,
+        "first_step_s": first.at.duration_since(start).as_secs_f64(),
+        "step_s": last.at.duration_since(first.at).as_secs_f64() / steps,
         "step_cpu_s": cpu,
         "step_cpu_s_per_million_unknowns": cpu / (1e-6 * report.dofs as f64),
         // Of a step after the first.
@@ -88,11 +91,37 @@ pub fn run(options: &SuspensionBenchOptions) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// A run, its CPU seconds and its first step.
+/// A run, when its steps ended, and its first step.
 struct Timed {
     report: RunReport,
-    cpu: f64,
+    start: Instant,
+    ends: Vec<StepEnd>,
     motion: FirstStep,
+}
+
+/// The end of a step.
+struct StepEnd {
+    at: Instant,
+    /// Of this process.
+    cpu: f64,
+    /// Of the run so far.
+    phases: PhaseTable,
+}
+
+/// Takes note of the ends of steps.
+#[derive(Default)]
+struct Clock(Mutex<Vec<StepEnd>>);
+
+impl Progress for Clock {
+    fn report(&self, _: &ProgressState) {}
+
+    fn step(&self, row: &SolverRow<'_>) {
+        // The last flow of a run moves nothing.
+        if row.motion.parts > 0 {
+            let end = StepEnd { at: Instant::now(), cpu: cpu_seconds(), phases: row.phases.clone() };
+            self.0.lock().unwrap_or_else(PoisonError::into_inner).push(end);
+        }
+    }
 }
 
 /// The flow around the first configuration.
@@ -109,11 +138,11 @@ fn timed_run(options: &SuspensionBenchOptions, steps: usize, tolerance: f64) -> 
     let case = case(options, steps, tolerance).context("these options make no case")?;
     let folder = tempfile::tempdir().context("no folder for the results")?;
     let csv = folder.path().join("bench.csv");
-    let start = cpu_seconds();
-    let report = gluey::run(&case, &RunOptions::csv(&csv), &Silent)?;
-    let cpu = cpu_seconds() - start;
+    let (start, clock) = (Instant::now(), Clock::default());
+    let report = gluey::run(&case, &RunOptions::csv(&csv), &clock)?;
+    let ends = clock.0.into_inner().unwrap_or_else(PoisonError::into_inner);
     let motion = FirstStep::read(&ResultPaths::of_csv(&csv), options)?;
-    Ok(Timed { report, cpu, motion })
+    Ok(Timed { report, start, ends, motion })
 }
 
 /// What the first step differs by from that on a finer mesh: the viscosity over the finer one, velocities and
@@ -178,8 +207,8 @@ fn case(options: &SuspensionBenchOptions, steps: usize, tolerance: f64) -> Resul
     Case::parse(&text, "bench-suspension")
 }
 
-fn seconds(report: &RunReport, phase: &str) -> f64 {
-    report.phases.iter().filter(|(name, _)| name == phase).map(|(_, seconds)| seconds).sum()
+fn seconds(phases: &PhaseTable, phase: &str) -> f64 {
+    phases.rows().iter().filter(|(name, _)| name == phase).map(|(_, seconds)| seconds).sum()
 }
 
 #[cfg(unix)]
@@ -225,6 +254,21 @@ mod tests {
     fn options_that_make_no_case_are_told() {
         let error = case(&options(10, 4), 1, USUAL).unwrap_err().to_string();
         assert!(error.contains("dimension"), "{error}");
+    }
+
+    #[test]
+    fn every_step_has_its_end() {
+        let Timed { start, ends, .. } = timed_run(&options(10, 2), 3, USUAL).unwrap();
+        assert_eq!(ends.len(), 3);
+        let first = StepEnd { at: start, cpu: 0.0, phases: PhaseTable::default() };
+        for (before, end) in std::iter::once(&first).chain(&ends).zip(&ends) {
+            let step = end.at.duration_since(before.at).as_secs_f64();
+            let phases = ["mesh and assembly", "solver set-up", "solve"]
+                .map(|name| seconds(&end.phases, name) - seconds(&before.phases, name));
+            assert!(phases.iter().all(|seconds| *seconds > 0.0), "{phases:?}");
+            assert!(end.cpu > before.cpu || cfg!(not(unix)));
+            assert!(phases.iter().sum::<f64>() < step, "{phases:?} of {step}");
+        }
     }
 
     /// None on the same mesh but for the tolerance, some per cent on one with twice the cells in a radius.
