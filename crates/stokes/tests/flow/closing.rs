@@ -34,7 +34,9 @@ fn gradient<const D: usize>(is_oblique: bool) -> Matrix<D> {
 /// Rate of change of the distance of two balls.
 fn opening<const D: usize>(flow: &Flow<D>, balls: &[Ball<D>], [i, j]: [usize; 2]) -> f64 {
     let branch = balls[j].center() - balls[i].center();
-    let relative = flow.twists[j].velocity - flow.twists[i].velocity + flow.strain * branch;
+    // Each body beside the undisturbed flow first: that has no rounding where both move with it.
+    let half = flow.strain * branch * 0.5;
+    let relative = (flow.twists[j].velocity + half) - (flow.twists[i].velocity - half);
     relative.dot(&branch.normalize())
 }
 
